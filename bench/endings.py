@@ -10,6 +10,8 @@ completed: the method was played to its end; stopped: in a controlled way, by a 
 once, by a person; tripped: by the bench itself, after an interlock, a failed instrument or a failed recorder."""
 STOP_REASON = "stopped on request"
 """Reason of a run that a person has stopped."""
+ABORT_REASON = "aborted by a person"
+"""Reason of a trip by a person."""
 SHUT_DOWN_REASON = "the agent was shut down"
 """Reason of a run whose agent was ended in order."""
 _LIMIT_WORDS = "exceeds the limit of"

@@ -40,7 +40,7 @@ from bench.agent_protocol import (
 )
 from bench.config import BenchConfig, compute_identity
 from bench.disk import SpaceMonitor
-from bench.endings import SHUT_DOWN_REASON, STOP_REASON, RunEnding
+from bench.endings import ABORT_REASON, SHUT_DOWN_REASON, STOP_REASON, RunEnding
 from bench.errors import BenchError, LogError
 from bench.live import BatchMaker, LiveBatch
 from bench.log import list_sample_units
@@ -242,7 +242,7 @@ class Agent:
     def abort(self) -> Reply:
         """Trip at once, by a person; latches, also if nothing is in progress."""
         self._report_event("command", "abort")
-        self._supervisor.trip("aborted by a person", by_person=True)
+        self._supervisor.trip(ABORT_REASON, by_person=True)
         return Reply(ok=True, status=self.get_status())
 
     def reset(self) -> Reply:

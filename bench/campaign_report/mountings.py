@@ -7,8 +7,8 @@ from bench.campaigns import CampaignState, Item
 
 MOUNTING_RULE = (
     "A new mounting of a specimen begins with its first run, after a run of another specimen, and after an"
-    " answered prompt whose text contains “mount”, such as “Remount the damper”. Other prompts, rests and warm-ups"
-    " separate no mountings. Work that the campaign does not ask for is not known to this report."
+    " answered prompt whose text contains “mount”, such as “Remount the damper”, or the setup step mount. Other"
+    " steps separate no mountings. Work that the campaign does not ask for is not known to this report."
 )
 """Rule by which runs belong to a mounting, for a person."""
 _MOUNT = re.compile("mount", re.IGNORECASE)
@@ -35,6 +35,10 @@ def number_mountings(state: CampaignState) -> Mapping[str, int]:
 
 
 def is_remount(item: Item) -> bool:
-    """Return whether an item is a prompt that a person has answered and that asks for a mounting."""
-    prompt = getattr(item.step, "prompt", None)
-    return prompt is not None and item.state == "done" and _MOUNT.search(prompt.text) is not None
+    """Return whether an item is an answered prompt that asks for a mounting, or a mounting that was done."""
+    if item.state != "done":
+        return False
+    setup, prompt = (getattr(item.step, kind, None) for kind in ("setup", "prompt"))
+    if setup is not None:
+        return bool(setup.step == "mount")
+    return prompt is not None and _MOUNT.search(prompt.text) is not None

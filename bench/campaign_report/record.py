@@ -44,7 +44,7 @@ def _make_time_rows(report: CampaignReport) -> list[Row]:
     return [
         ("Time in motion", format_duration(times.stroking_s)),
         ("Time at rest", format_duration(times.rest_s)),
-        ("Time held", f"{format_duration(times.held_s)} (paused, waiting, or without a process)"),
+        ("Time held", f"{format_duration(times.held_s)} (paused, waiting, in setup steps, or without a process)"),
     ]
 
 
@@ -108,6 +108,26 @@ def make_steps(report: CampaignReport) -> Section:
 
 def _make_part_row(item: ItemView) -> Row:
     return item.id, item.label, ", ".join(item.parts) or "none", str(item.crashes)
+
+
+def make_setup_steps(report: CampaignReport) -> Section:
+    """Make the section on the setup steps of the bench that have begun, such as a tare between two runs."""
+    items = [item for item in report.view.items if item.kind == "setup" and item.started is not None]
+    rows = [
+        (
+            item.id,
+            item.label,
+            format_time(item.started),
+            format_time(item.ended),
+            format_name(item.state),
+            item.reason or "–",
+        )
+        for item in items
+    ]
+    table = Table(
+        rows, ("Step", "Content", "Begun", "Ended", "State", "Result"), (1, 3, 3, 3, 2, 5), "Setup steps"
+    )
+    return Section("Setup steps", [] if rows else ["No setup step has begun."], [table] if rows else [])
 
 
 def make_answers(report: CampaignReport) -> Section:

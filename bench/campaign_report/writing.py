@@ -8,7 +8,14 @@ from typing import Any, Literal, TypeAlias, get_args
 from bench.campaign_report.content import CampaignReport
 from bench.campaign_report.findings import make_findings, make_key_figures
 from bench.campaign_report.plots import make_pictures
-from bench.campaign_report.record import make_answers, make_conditions, make_head_rows, make_messages, make_steps
+from bench.campaign_report.record import (
+    make_answers,
+    make_conditions,
+    make_head_rows,
+    make_messages,
+    make_setup_steps,
+    make_steps,
+)
 from bench.campaign_report.results import make_errors, make_results, make_scatter, make_trends
 from bench.report.layout import Picture, Section, Table, make_environment, write_document
 
@@ -25,6 +32,7 @@ def make_sections(report: CampaignReport) -> list[Section]:
         make_trends(report),
         make_scatter(report),
         make_steps(report),
+        make_setup_steps(report),
         make_answers(report),
         make_messages(report),
     ]

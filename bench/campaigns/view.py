@@ -21,7 +21,7 @@ class ItemView(FrozenModel):
     """Step of the queue."""
 
     id: str
-    kind: str = Field(description="run, rest, warm_up, repeat, next_stroke or prompt")
+    kind: str = Field(description="run, rest, warm_up, repeat, next_stroke, prompt or setup")
     label: str = Field(description="the step for a person")
     state: str = Field(description="pending, active, done, skipped, failed or held_back")
     specimen: str = Field(description="empty for a step without a run of its own")
@@ -117,7 +117,9 @@ class CampaignView(FrozenModel):
     updated: datetime = Field(description="UTC; that of the simulated clock on the simulated plant")
     operator: str
     current: ItemView | None = Field(description="step in progress")
-    phase: str = Field(description="starting, stroking, evaluating, resting or asking; empty between steps")
+    phase: str = Field(
+        description="starting, stroking, preparing, evaluating, resting or asking; empty between steps"
+    )
     next: ItemView | None = Field(description="next step")
     waits_for: str = Field(description="reason why the next step cannot begin; empty if it can")
     question: Question | None = Field(description="question to a person; null if none is asked")
@@ -136,6 +138,7 @@ def make_view(campaign: StoredCampaign, events: Sequence[CampaignEventRow] = ())
     units = {name: method.drive_unit for name, method in campaign.methods.items()}
     active = state.active
     current = None if active is None else state.get_item(active.item)
+    following = state.next_item or next(iter(state.pending), None)
     return CampaignView(
         id=campaign.id,
         name=state.campaign.name,
@@ -147,7 +150,7 @@ def make_view(campaign: StoredCampaign, events: Sequence[CampaignEventRow] = ())
         operator=state.operator,
         current=None if current is None else _make_item(current, units),
         phase="" if active is None else active.phase,
-        next=next((_make_item(item, units) for item in state.pending), None),
+        next=None if following is None else _make_item(following, units),
         waits_for=state.waits_for or _describe_awaited(state),
         question=_make_question(state, current),
         expected_end=None if state.has_ended else _at(state.updated + estimate_remaining(state)),

@@ -20,6 +20,7 @@ from bench.agent_protocol import (
     ResetCommand,
     RunCommand,
     RunStatus,
+    SetupStatus,
     StopCommand,
     get_sender,
 )
@@ -37,6 +38,8 @@ class FakeAgent:
         self.published = queue.Queue()
         self.reachable = True
         self.refuses = ""
+        self.setup = None
+        """Outcome and message of the setup steps; None leaves the status as it is."""
         self.overdue = ()
         self.failed_checks = ()
         self.commands = []
@@ -81,6 +84,8 @@ class FakeAgent:
         match command:
             case RunCommand():
                 self._begin(command)
+            case PrepareCommand() if self.setup is not None:
+                self._set(step=SetupStatus(step=command.step, **self.setup))
             case StopCommand():
                 self._set(state="stopping")
             case PauseCommand():

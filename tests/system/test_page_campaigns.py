@@ -108,7 +108,7 @@ def test_the_photo_of_an_answer_is_saved_from_the_queue(seen):
 def test_the_queue_is_edited_with_the_name_of_the_person(seen):
     edits = [body for method, _, body in seen["sent"] if method == "PATCH"]
     assert {one["who"] for one in edits} == {"A. Meyer"}
-    assert [one["edit"]["edit"] for one in edits] == ["move", "pause", "delete", "do_now", "add", "release"]
+    assert [one["edit"]["edit"] for one in edits] == ["move", "pause", "delete", "do_now", "add", "add", "release"]
     assert seen["focusStays"].startswith("Earlier: step s0022")
     assert "Not edited: step s0020" in seen["refusedNow"]
     assert "between two runs" in seen["refusedNow"]
@@ -123,7 +123,10 @@ def test_the_queue_is_edited_with_the_name_of_the_person(seen):
         "s0026",
         "s0027",
         "s0029",
+        "s0030",
     ]
+    assert edits[-2]["edit"]["steps"] == [{"setup": {"step": "move", "position_m": 0.0125}}]
+    assert not seen["hasPosition"]
 
 
 @browser_test

@@ -19,6 +19,7 @@ from bench.agent_protocol import (
     StatusCommand,
     get_sender,
 )
+from bench.campaigns.benches.agent_setup import AgentSetup, find_setup
 from bench.campaigns.benches.recovery import make_end_report, recover_execution
 from bench.campaigns.benches.results import read_result
 from bench.campaigns.document import Campaign, CampaignError, Step
@@ -113,6 +114,7 @@ class AgentBench:
         self._catalogue, self._agent, self._thermometer = catalogue, agent, thermometer
         self._wait, self._sleep = wait, sleep
         self._has_lease, self._renewal = False, float("-inf")
+        self._setup = AgentSetup(agent)
 
     def check_needs(self, campaign: Campaign, steps: Sequence[Step]) -> None:
         """Check that there is a thermometer if a condition needs one.
@@ -135,25 +137,27 @@ class AgentBench:
         return time.time()
 
     def recover(self, campaign: StoredCampaign) -> ExecutionReport | None:
-        """Return the state of the active run, from the agent or from its log."""
-        return self._report(campaign)
+        """Return the state of the active run, from the agent or from its log, or that of a setup step."""
+        return self._setup.take_over(campaign) if find_setup(campaign) else self._report(campaign)
 
     def observe(self, campaign: StoredCampaign) -> Observation:
-        """Return the state of the run, the temperature, new results, and the readiness of the agent."""
+        """Return the state of run or setup step, the temperature, new results, and the readiness of the agent."""
         return Observation(
-            report=self._report(campaign) if campaign.state.is_stroking else None,
+            report=self._report(campaign) if campaign.state.is_executing else None,
             temperature_c=self._thermometer.read(),
             results=self._read_results(campaign),
             obstacle=_find_obstacle(self._get_status()),
         )
 
     def start(self, campaign: StoredCampaign) -> None:
-        """Send the active run to the agent, and wait until its status has it.
+        """Send the active setup step to the agent, or the active run and wait until its status has it.
 
         Raises:
             BenchError: the agent refuses it or does not answer.
         """
         state = campaign.state
+        if find_setup(campaign) is not None:
+            self._setup.start(campaign)
         if state.active is None or state.active.execution is None:
             return
         item, execution = state.get_item(state.active.item), state.active.execution
@@ -208,7 +212,9 @@ class AgentBench:
             return None
 
     def _report(self, campaign: StoredCampaign) -> ExecutionReport | None:
-        """Return the state of the active run; None while it is not known."""
+        """Return the state of the active run or setup step; None while it is not known."""
+        if find_setup(campaign) is not None:
+            return self._setup.report(campaign)
         active = campaign.state.active
         if active is None or active.execution is None:
             return None

@@ -11,10 +11,11 @@ from datetime import UTC, datetime
 import numpy as np
 import numpy.typing as npt
 
+from bench.campaigns.benches.agent_setup import find_setup
 from bench.campaigns.benches.local_jobs import evaluate_run
 from bench.campaigns.benches.recovery import make_end_report, recover_execution
 from bench.campaigns.benches.results import read_result
-from bench.campaigns.document import Campaign, CampaignError, RestStep, Step
+from bench.campaigns.document import Campaign, CampaignError, RestStep, Step, estimate_setup_duration
 from bench.campaigns.engine import (
     ExecutionReport,
     Observation,
@@ -35,6 +36,8 @@ HOLD_RATE = 50.0
 """[Hz] Sampling rate of a rest on the plant."""
 HOLD_TIME = 120.0
 """[s] Longest part of a rest that is played at once."""
+SETUP_RESULT = "the simulated plant only lets the time of a setup step pass"
+"""Result of a setup step, for a person."""
 Array = npt.NDArray[np.float64]
 _POLL_PERIOD = 0.3
 """[s] Real time between two looks for an answer or a command."""
@@ -101,12 +104,15 @@ class PlantBench:
         return Observation(report=report, temperature_c=self._temperature, results=self._evaluate(campaign))
 
     def start(self, campaign: StoredCampaign) -> None:
-        """Play the active run to its end, and let its time pass.
+        """Play the active run to its end, and let its time pass; a setup step only takes its time.
 
         Raises:
             BenchError: the method or the rig fails.
         """
         state = campaign.state
+        if (setup := find_setup(campaign)) is not None:
+            self._stand(estimate_setup_duration(setup), campaign)
+            self._report = ExecutionReport(kind="ended", reason=SETUP_RESULT)
         if state.active is None or state.active.execution is None:
             return
         item, execution = state.get_item(state.active.item), state.active.execution
@@ -142,18 +148,16 @@ class PlantBench:
     def wait(self, campaign: StoredCampaign) -> None:
         """Let a rest pass on the simulated clock; else wait in real time for an answer or a command."""
         state = campaign.state
-        if state.active is None and state.status == "running" and not state.awaited_run:
-            return
-        if state.active is not None and state.active.phase == "resting" and state.status == "running":
+        if state.active is not None and state.active.phase == "resting" and not state.is_held:
             step = state.get_item(state.active.item).step
-            self._rest(step, max(0.0, (state.active.deadline or self._now) - self._now), campaign)
-        elif state.status == "paused" or state.needs_person or state.awaited_run:
+            target = step.rest.until_temperature_c if isinstance(step, RestStep) else None
+            self._stand(max(0.0, (state.active.deadline or self._now) - self._now), campaign, target)
+        elif state.is_held or state.needs_person or state.awaited_run:
             self._sleep(_POLL_PERIOD)
             self._now += _POLL_PERIOD
 
-    def _rest(self, step: Step, remaining: float, campaign: StoredCampaign) -> None:
-        """Let a rest pass up to its end, but no further than the temperature that it waits for."""
-        target = step.rest.until_temperature_c if isinstance(step, RestStep) else None
+    def _stand(self, remaining: float, campaign: StoredCampaign, target: float | None = None) -> None:
+        """Let a time at standstill [s] pass, but no further than the temperature [°C] that a rest waits for."""
         if not needs_thermometer(item.step for item in campaign.state.items):
             self._now += remaining
             return

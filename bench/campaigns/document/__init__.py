@@ -34,6 +34,7 @@ from bench.campaigns.document.plan import (
 )
 from bench.campaigns.document.planned_methods import FindObstacles
 from bench.campaigns.document.steps import (
+    BenchSetupStep,
     DiagnosisGoal,
     IntervalGoal,
     NextStrokeStep,
@@ -43,8 +44,10 @@ from bench.campaigns.document.steps import (
     RestStep,
     RunSpec,
     RunStep,
+    SetupSpec,
     Step,
     WarmUpStep,
+    estimate_setup_duration,
     find_run,
     get_step_kind,
 )
@@ -61,6 +64,7 @@ from bench.campaigns.document.strokes import (
 __all__ = [
     "WARM_UP_METHOD",
     "AnyStep",
+    "BenchSetupStep",
     "Campaign",
     "CampaignDocumentError",
     "CampaignError",
@@ -82,6 +86,7 @@ __all__ = [
     "RestStep",
     "RunSpec",
     "RunStep",
+    "SetupSpec",
     "Step",
     "StopOnDrift",
     "StopOnTrip",
@@ -93,6 +98,7 @@ __all__ = [
     "collect_step_methods",
     "describe_step",
     "estimate_durations",
+    "estimate_setup_duration",
     "expand_campaign",
     "find_next_run",
     "find_problems",

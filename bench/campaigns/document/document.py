@@ -19,6 +19,7 @@ from pydantic import (
 from bench.campaigns.document.errors import CampaignDocumentError
 from bench.campaigns.document.steps import (
     STEP_KINDS,
+    BenchSetupStep,
     DiagnosisGoal,
     IntervalGoal,
     NextStrokeStep,
@@ -38,11 +39,12 @@ AnyStep: TypeAlias = Annotated[
     | Annotated[WarmUpStep, Tag("warm_up")]
     | Annotated[RepeatStep, Tag("repeat")]
     | Annotated[NextStrokeStep, Tag("next_stroke")]
-    | Annotated[PromptStep, Tag("prompt")],
+    | Annotated[PromptStep, Tag("prompt")]
+    | Annotated[BenchSetupStep, Tag("setup")],
     Discriminator(
         get_step_kind,
         custom_error_type="step_kind",
-        custom_error_message="a step has exactly one of the keys run, rest, warm_up, repeat, next_stroke, prompt",
+        custom_error_message=f"a step has exactly one of the keys {', '.join(STEP_KINDS)}",
     ),
 ]
 """A step, recognised by its only key."""

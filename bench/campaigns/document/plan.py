@@ -15,12 +15,15 @@ from bench.campaigns.document.planned_methods import (
     plan_methods,
 )
 from bench.campaigns.document.steps import (
+    BenchSetupStep,
     NextStrokeStep,
     RepeatStep,
     RestStep,
     RunSpec,
     Step,
     WarmUpStep,
+    describe_setup,
+    estimate_setup_duration,
     find_run,
     get_step_kind,
 )
@@ -37,7 +40,7 @@ class PlannedStep(FrozenModel):
     """One step with its expected time, heat and disk space."""
 
     number: int = Field(description="[1] position, from 1.")
-    kind: str = Field(description="run, rest, warm_up, repeat, next_stroke or prompt.")
+    kind: str = Field(description="run, rest, warm_up, repeat, next_stroke, prompt or setup.")
     label: str = Field(description="The step for a person.")
     duration_s: float = Field(description="[s] expected duration; 0 if it is not known.")
     longest_s: float | None = Field(description="[s] longest duration; null for a step that waits for a person.")
@@ -96,7 +99,7 @@ def plan_campaign(
         campaign=campaign.name,
         duration_s=sum(step.duration_s for step in planned),
         longest_s=sum(step.longest_s or 0.0 for step in planned),
-        stroking_s=sum(step.duration_s for step in planned if step.kind not in ("rest", "prompt")),
+        stroking_s=sum(step.duration_s for step in planned if step.kind not in ("rest", "prompt", "setup")),
         heat_j=sum(step.heat_j for step in planned),
         log_bytes=log_bytes,
         free_bytes=free_bytes,
@@ -146,6 +149,8 @@ def describe_step(step: Step, methods: Methods) -> str:
     if isinstance(step, WarmUpStep):
         cycles, target = step.warm_up.cycles, step.warm_up.until_temperature_c
         return f"warm-up, {cycles} cycles" if cycles is not None else f"warm-up until {target:g} °C"
+    if isinstance(step, BenchSetupStep):
+        return describe_setup(step.setup)
     return step.prompt.text if get_step_kind(step) == "prompt" else ""  # type: ignore[union-attr]
 
 
@@ -180,6 +185,9 @@ class _StepPlanner:
         if isinstance(step, RestStep):
             seconds = step.rest.seconds
             return (seconds or 0.0, seconds or step.rest.timeout_s, 0.0, 0)
+        if isinstance(step, BenchSetupStep):
+            seconds = estimate_setup_duration(step.setup)
+            return (seconds, seconds, 0.0, 0)
         if isinstance(step, WarmUpStep):
             return self._plan_warm_up(step, find_next_run(following) or preceding)
         run = find_run(step) or (preceding if isinstance(step, NextStrokeStep) else None)

@@ -4,10 +4,13 @@ from typing import Any, Literal, Self, TypeAlias
 
 from pydantic import Field, PositiveFloat, PositiveInt, model_validator
 
+from bench.setup_steps import MOVING_STEPS, SetupStep
 from bench.validation import FrozenModel
 
 DEFAULT_TIMEOUT = 3600.0
 """[s] Time limit of a condition without its own."""
+SETUP_MOTION_TIME, SETUP_TIME = 20.0, 1.0
+"""[s] Expected duration of a setup step with and without a motion of the rod."""
 
 
 class RunSpec(FrozenModel):
@@ -136,8 +139,33 @@ class PromptStep(FrozenModel):
     prompt: PromptSpec = Field(description="Wait until a person answers.")
 
 
-Step: TypeAlias = RunStep | RestStep | WarmUpStep | RepeatStep | NextStrokeStep | PromptStep
-STEP_KINDS = ("run", "rest", "warm_up", "repeat", "next_stroke", "prompt")
+class SetupSpec(FrozenModel):
+    """Setup step of the bench."""
+
+    step: SetupStep = Field(
+        description="home, move, tare, clear-tare, centre, mount or unmount, as before a single run."
+    )
+    position_m: float | None = Field(
+        default=None,
+        allow_inf_nan=False,
+        description="[m] target of move, from the specimen's middle, or from home before one is centred.",
+    )
+
+    @model_validator(mode="after")
+    def _check_position(self) -> Self:
+        if (self.step == "move") != (self.position_m is not None):
+            raise ValueError("move needs position_m, and no other setup step takes it")
+        return self
+
+
+class BenchSetupStep(FrozenModel):
+    """Setup step of the bench between two runs, such as a tare or a move."""
+
+    setup: SetupSpec = Field(description="Setup step of the bench; on the simulated plant it only takes its time.")
+
+
+Step: TypeAlias = RunStep | RestStep | WarmUpStep | RepeatStep | NextStrokeStep | PromptStep | BenchSetupStep
+STEP_KINDS = ("run", "rest", "warm_up", "repeat", "next_stroke", "prompt", "setup")
 """Keys of the kinds of steps."""
 
 
@@ -145,6 +173,17 @@ def get_step_kind(step: Any) -> str:
     """Return the kind of a step, or of the document of one; empty if it is neither."""
     names = list(step) if isinstance(step, dict) else list(getattr(type(step), "model_fields", ()))
     return names[0] if len(names) == 1 and names[0] in STEP_KINDS else ""
+
+
+def describe_setup(spec: SetupSpec) -> str:
+    """Describe a setup step for a person, with the unit of its position."""
+    target = "" if spec.position_m is None else f" to {1e3 * spec.position_m:g} mm"
+    return f"setup step {spec.step}{target}"
+
+
+def estimate_setup_duration(spec: SetupSpec) -> float:
+    """Return the expected duration of a setup step [s]; that of a motion depends on the bench."""
+    return SETUP_MOTION_TIME if spec.step in MOVING_STEPS else SETUP_TIME
 
 
 def find_run(step: Step) -> RunSpec | None:

@@ -15,14 +15,16 @@ ANSWER_LENGTH = 2000
 
 
 def pause(state: CampaignState, now: float, who: str = "") -> CampaignState:
-    """Pause at the next checkpoint of the run in progress, or at once between runs.
+    """Pause at the next checkpoint of the run in progress, after a setup step, or at once between runs.
 
     Raises:
         CampaignError: the campaign has ended or is paused.
     """
     _check_running(state, "paused")
     state = say(state, now, "edit", "pause at the next checkpoint", who)
-    return change(state, status="pausing" if state.is_stroking else "paused", reason="paused on request")
+    items = tuple(item.model_copy(update={"is_during_pause": False}) for item in state.items)
+    status = "pausing" if state.is_executing else "paused"
+    return change(state, items=items, status=status, reason="paused on request")
 
 
 def resume(state: CampaignState, now: float, who: str = "") -> CampaignState:
@@ -37,7 +39,7 @@ def resume(state: CampaignState, now: float, who: str = "") -> CampaignState:
 
 
 def stop(state: CampaignState, now: float, who: str = "", reason: str = "") -> CampaignState:
-    """Stop after the run in progress, or at once between runs.
+    """Stop after the run or setup step in progress, or at once between runs.
 
     Raises:
         CampaignError: the campaign has ended.
@@ -45,7 +47,7 @@ def stop(state: CampaignState, now: float, who: str = "", reason: str = "") -> C
     _check_not_ended(state, "stopped")
     text = reason or "stopped on request"
     state = say(state, now, "edit", f"stop: {text}", who)
-    if state.is_stroking:
+    if state.is_executing:
         return change(state, status="stopping", reason=text)
     return end_campaign(state, now, "stopped", text)
 

@@ -53,7 +53,10 @@ class PauseEdit(FrozenModel):
 
 
 class DoNowEdit(FrozenModel):
-    """One step between two runs, refused during a run; a rest or prompt in progress begins again afterwards."""
+    """One step between two runs, also during a pause; a rest or prompt in progress begins again afterwards.
+
+    It is refused during a run. A campaign that is paused stays so.
+    """
 
     edit: Literal["do_now"]
     step: AnyStep = Field(description="Step to begin next.")
@@ -165,8 +168,9 @@ def _do_now(state: CampaignState, edit: DoNowEdit, methods: Methods) -> tuple[Ca
     state = _interrupt(state)
     pending = state.pending
     index = state.items.index(pending[0]) if pending else len(state.items)
-    state, added = _insert(state, (edit.step,), methods, index)
-    return state, f"now: {added[0].id} {added[0].label}"
+    state, (added,) = _insert(state, (edit.step,), methods, index)
+    state = change_item(state, added.id, is_during_pause=state.status == "paused")
+    return state, f"now: {added.id} {added.label}{', during the pause' if state.status == 'paused' else ''}"
 
 
 def _interrupt(state: CampaignState) -> CampaignState:

@@ -82,8 +82,8 @@ def _continue_warm_up(state: CampaignState, now: float, campaign_id: str) -> Cam
         return end_item(state, now, "done")
     if temperature is not None and temperature >= target:
         return end_item(state, now, "done", f"{temperature:.2f} °C after {now - active.started:.0f} s")
-    if state.status != "running":
-        return _put_back(state)
+    if state.status in ("pausing", "stopping"):
+        return put_back(state)
     if active.deadline is not None and now >= active.deadline:
         shown = "nothing" if temperature is None else f"{temperature:.2f} °C"
         limit = active.deadline - active.started
@@ -100,11 +100,10 @@ def _take_incomplete(state: CampaignState, report: ExecutionReport, now: float) 
     """Take a run that ended early: paused by a command, stopped by a person, or tripped."""
     state = _keep_part(state, report)
     if state.status in ("pausing", "stopping"):
-        return _put_back(state)
+        return put_back(state)
     if report.ending in ("stopped", "aborted"):
         reason = f"run {report.run} was {report.ending} by a person: {report.reason}"
-        state = say(_put_back(state), now, "person_needed", f"{reason}; resume or stop the campaign")
-        return change(state, status="paused", reason=reason)
+        return hold_for_person(state, now, reason)
     reason = report.reason or "the run ended early"
     if report.ending == "tripped" and any(isinstance(one, StopOnTrip) for one in state.campaign.stop_on):
         return end_campaign(state, now, "stopped", f"run {report.run} has tripped: {reason}")
@@ -116,15 +115,25 @@ def _take_crash(state: CampaignState, report: ExecutionReport, now: float) -> Ca
     if active is None:
         return state
     state = _keep_part(state, report)
-    item = state.get_item(active.item)
-    state = change_item(state, item.id, crashes=item.crashes + 1)
     reason = report.reason or "the bench ended in the middle of the run"
-    if item.crashes + 1 >= MAX_CRASHES:
-        text = f"held back after {MAX_CRASHES} crashes of the bench: {reason}"
-        state = end_item(state, now, "held_back", text)
-        return say(state, now, "held_back", f"step {item.id}, {item.label}: {text}", item=item.id)
+    state, is_held_back = count_crash(state, reason, now)
+    if is_held_back:
+        return state
     place = f"continues after {report.checkpoint}" if report.checkpoint else "is repeated"
-    return say(_put_back(state), now, "note", f"step {item.id} {place}: {reason}", item=item.id)
+    return say(put_back(state), now, "note", f"step {active.item} {place}: {reason}", item=active.item)
+
+
+def count_crash(state: CampaignState, reason: str, now: float) -> tuple[CampaignState, bool]:
+    """Count a crash of the bench in the active step; return the state, and whether the step was held back."""
+    if state.active is None:
+        return state, False
+    item = state.get_item(state.active.item)
+    state = change_item(state, item.id, crashes=item.crashes + 1)
+    if item.crashes + 1 < MAX_CRASHES:
+        return state, False
+    text = f"held back after {MAX_CRASHES} crashes of the bench: {reason}"
+    state = end_item(state, now, "held_back", text)
+    return say(state, now, "held_back", f"step {item.id}, {item.label}: {text}", item=item.id), True
 
 
 def _keep_part(state: CampaignState, report: ExecutionReport) -> CampaignState:
@@ -142,15 +151,32 @@ def _keep_part(state: CampaignState, report: ExecutionReport) -> CampaignState:
     return change_item(state, item.id, parts=parts, resume_after=after, continues=continues)
 
 
-def _put_back(state: CampaignState) -> CampaignState:
+def hold_for_person(state: CampaignState, now: float, reason: str) -> CampaignState:
+    """Pause because a person has ended the active step, which begins again after the pause."""
+    active = state.active
+    state = say(put_back(state), now, "person_needed", f"{reason}; resume or stop the campaign")
+    if active is not None:
+        # A person who stops the step must not see it begin again at once.
+        state = change_item(state, active.item, is_during_pause=False)
+    return change(state, status="paused", reason=reason)
+
+
+def put_back(state: CampaignState) -> CampaignState:
     """Make the active item pending again."""
     if state.active is None:
         return state
     return change(change_item(state, state.active.item, state="pending"), active=None)
 
 
-def fail(state: CampaignState, now: float, reason: str) -> CampaignState:
-    """Apply the policy of the campaign to a failure of the active step."""
+def fail(state: CampaignState, now: float, reason: str, *, is_repeatable: bool = True) -> CampaignState:
+    """Apply the policy of the campaign to a failure of the active step.
+
+    Args:
+        state: the present state.
+        now: UTC [s].
+        reason: reason of the failure, for a person.
+        is_repeatable: whether it may be repeated without a person; else one is asked instead.
+    """
     active = state.active
     if active is None:
         return state
@@ -159,8 +185,10 @@ def fail(state: CampaignState, now: float, reason: str) -> CampaignState:
     state = change_item(state, item.id, failures=failures, reason=reason)
     state = say(state, now, "failed", f"step {item.id}, {item.label}: {reason}", item=item.id)
     policy = state.campaign.on_failure
+    if policy == "retry" and not is_repeatable:
+        policy = "ask"
     if policy == "retry" and failures <= state.campaign.retries:
-        return _put_back(state)
+        return put_back(state)
     if policy == "skip":
         return end_item(state, now, "failed", reason)
     if policy == "ask":

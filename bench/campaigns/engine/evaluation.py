@@ -91,7 +91,7 @@ def _decide_next_stroke(
 
 def _run_again(state: CampaignState, item: Item, now: float, campaign_id: str) -> CampaignState:
     """Request the next run, unless the campaign is to pause or to stop first."""
-    if state.status != "running":
+    if state.status in ("pausing", "stopping"):
         return change(change_item(state, item.id, state="pending"), active=None)
     started = state.active.started if state.active is not None else now
     execution = make_execution(campaign_id, item)

@@ -4,13 +4,14 @@
 acts. A process that was killed at any moment thus finds where to continue.
 """
 
-from bench.campaigns.document import PromptStep, RestStep, WarmUpStep
+from bench.campaigns.document import BenchSetupStep, PromptStep, RestStep, WarmUpStep
 from bench.campaigns.engine.changes import change, change_item, end_campaign, end_item, say
 from bench.campaigns.engine.conditions import describe_unchecked, find_awaited_run, find_stop_reason
 from bench.campaigns.engine.endings import fail, take_report
 from bench.campaigns.engine.evaluation import evaluate, needs_evaluation
 from bench.campaigns.engine.executions import make_execution
-from bench.campaigns.engine.observation import Observation
+from bench.campaigns.engine.observation import ExecutionReport, Observation
+from bench.campaigns.engine.setup_reports import take_setup_report
 from bench.campaigns.engine.state import Active, CampaignState, Item
 
 OBSTACLE_TIME = 300.0
@@ -27,13 +28,13 @@ def advance(state: CampaignState, seen: Observation, now: float, campaign_id: st
         campaign_id: id of the campaign, for the names of logs.
     """
     state = _take_observation(_account(state, now), seen, now)
-    if state.has_ended or state.status == "paused":
+    if state.has_ended or state.is_held:
         return state
     if state.active is None:
         return _begin_next(state, seen, now, campaign_id)
     match state.active.phase:
-        case "starting" | "stroking":
-            return state if seen.report is None else take_report(state, seen.report, now, campaign_id)
+        case "starting" | "stroking" | "preparing":
+            return state if seen.report is None else _take_any_report(state, seen.report, now, campaign_id)
         case "evaluating":
             return evaluate(state, now, campaign_id)
         case "resting":
@@ -48,9 +49,16 @@ def recover(state: CampaignState, seen: Observation, now: float, campaign_id: st
     times = state.times.model_copy(update={"held_s": state.times.held_s + gap})
     state = change(state, times=times, updated=max(now, state.updated))
     state = say(state, now, "note", f"the campaign continues after {gap:.0f} s without a process")
-    if not state.is_stroking or seen.report is None or state.has_ended:
+    if not state.is_executing or seen.report is None or state.has_ended:
         return state
-    return take_report(state, seen.report, now, campaign_id)
+    return _take_any_report(state, seen.report, now, campaign_id)
+
+
+def _take_any_report(state: CampaignState, report: ExecutionReport, now: float, campaign_id: str) -> CampaignState:
+    """Take a report on the run or the setup step in progress."""
+    if state.is_stroking:
+        return take_report(state, report, now, campaign_id)
+    return take_setup_report(state, report, now)
 
 
 def _account(state: CampaignState, now: float) -> CampaignState:
@@ -66,7 +74,7 @@ def _account(state: CampaignState, now: float) -> CampaignState:
 
 
 def _take_observation(state: CampaignState, seen: Observation, now: float) -> CampaignState:
-    is_waiting = state.active is None and not state.has_ended and state.status != "paused"
+    is_waiting = state.active is None and not state.has_ended and not state.is_held
     values: dict[str, object] = {"waits_for": seen.obstacle if is_waiting else "", "awaited_run": ""}
     if seen.temperature_c is not None:
         values["temperature_c"] = seen.temperature_c
@@ -83,15 +91,15 @@ def _begin_next(state: CampaignState, seen: Observation, now: float, campaign_id
         return say(change(state, status="paused"), now, "note", "the campaign is paused")
     if reason := find_stop_reason(state):
         return end_campaign(state, now, "stopped", reason)
-    item = next(iter(state.pending), None)
-    # A person or a rest needs neither the bench nor earlier results.
-    can_begin = item is not None and isinstance(item.step, PromptStep | RestStep)
-    if not can_begin and (awaited := find_awaited_run(state, now)):
+    item = state.next_item
+    needs_results = item is None or not isinstance(item.step, PromptStep | RestStep | BenchSetupStep)
+    if needs_results and (awaited := find_awaited_run(state, now)):
         return change(state, awaited_run=awaited)
     if item is None:
         reasons = "all steps have ended", describe_unchecked(state)
         return end_campaign(state, now, "done", "; ".join(filter(None, reasons)))
-    if seen.obstacle and not can_begin:
+    # A person or a rest needs no bench.
+    if seen.obstacle and not isinstance(item.step, PromptStep | RestStep):
         return _wait_for_bench(state, seen.obstacle, now)
     return _begin(change(state, waits_since=None, is_wait_told=False), item, now, campaign_id)
 
@@ -120,6 +128,8 @@ def _begin(state: CampaignState, item: Item, now: float, campaign_id: str) -> Ca
         return change(state, active=active.model_copy(update={"phase": "asking"}))
     if needs_evaluation(state, item):
         return change(state, active=active.model_copy(update={"phase": "evaluating"}))
+    if isinstance(item.step, BenchSetupStep):
+        return change(state, active=active)
     if isinstance(item.step, WarmUpStep):
         active = active.model_copy(update={"deadline": now + item.step.warm_up.timeout_s})
     return change(state, active=active.model_copy(update={"execution": make_execution(campaign_id, item)}))

@@ -15,8 +15,9 @@ CampaignStatus: TypeAlias = Literal["running", "pausing", "paused", "stopping", 
 ENDED: tuple[CampaignStatus, ...] = ("done", "stopped")
 """Statuses of a campaign that does not continue."""
 ItemState: TypeAlias = Literal["pending", "active", "done", "skipped", "failed", "held_back"]
-Phase: TypeAlias = Literal["starting", "stroking", "evaluating", "resting", "asking"]
-"""starting: a run is about to be requested; evaluating: the results of a run are awaited; asking: a person is."""
+Phase: TypeAlias = Literal["starting", "stroking", "preparing", "evaluating", "resting", "asking"]
+"""starting: a run or setup step is about to be requested; preparing: a setup step is in progress; evaluating: the
+results of a run are awaited; asking: a person is."""
 MessageKind: TypeAlias = Literal["note", "restore_point", "edit", "person_needed", "held_back", "failed", "ended"]
 
 
@@ -73,6 +74,8 @@ class Item(FrozenModel):
     """Answer of the operator."""
     photo: str = ""
     """File of the operator's photo."""
+    is_during_pause: bool = False
+    """True for one step that is to be done now although the campaign is paused."""
     started: float | None = None
     ended: float | None = None
 
@@ -93,6 +96,7 @@ class Active(FrozenModel):
     phase: Phase
     since: float
     execution: Execution | None = None
+    """Run of this step; None for a step without a run, such as a setup step."""
     deadline: float | None = None
     is_question: bool = False
     """True if a person decides on a failure: retry, skip or stop."""
@@ -105,7 +109,7 @@ class Times(FrozenModel):
 
     stroking_s: float = 0.0
     held_s: float = 0.0
-    """Paused, waiting for a person, for results or for the bench, and while no process ran."""
+    """Paused, waiting for a person, for results or for the bench, in setup steps, and while no process ran."""
     rest_s: float = 0.0
 
 
@@ -183,12 +187,32 @@ class CampaignState(FrozenModel):
     @property
     def is_stroking(self) -> bool:
         """Return whether a run is in progress or about to begin."""
-        return self.active is not None and self.active.phase in ("starting", "stroking")
+        return self.is_executing and self.active is not None and self.active.execution is not None
+
+    @property
+    def is_executing(self) -> bool:
+        """Return whether a run or a setup step is in progress or about to begin."""
+        return self.active is not None and self.active.phase in ("starting", "stroking", "preparing")
+
+    @property
+    def next_item(self) -> Item | None:
+        """Item that begins next; during a pause only one that is to be done although the campaign is paused."""
+        is_paused = self.status == "paused"
+        return next((item for item in self.pending if item.is_during_pause or not is_paused), None)
+
+    @property
+    def is_held(self) -> bool:
+        """Return whether a pause holds the campaign, with no step to do during the pause."""
+        if self.status != "paused":
+            return False
+        if self.active is not None:
+            return not self.get_item(self.active.item).is_during_pause
+        return self.next_item is None
 
     @property
     def needs_lease(self) -> bool:
         """Return whether nobody else may start something; while the campaign waits for a person, others may."""
-        is_free = self.has_ended or self.status == "paused" or self.needs_person or bool(self.waits_for)
+        is_free = self.has_ended or self.is_held or self.needs_person or bool(self.waits_for)
         return not is_free
 
     @property

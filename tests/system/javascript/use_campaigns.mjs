@@ -106,6 +106,12 @@ async function editQueue() {
   await page.selectOption("#step-place", "");
   await page.click("#step-form button");
   await hasText("#campaign-result", "was added");
+  await page.selectOption("#step-kind", "setup");
+  seen.hasPosition = await page.locator("#step-position").isVisible();
+  await page.selectOption("#step-setup", "move");
+  await page.fill("#step-position", "12.5");
+  await page.click("#step-form button");
+  await hasText("#queue", "setup step move to 12.5 mm");
   await page.locator("#ended-steps tr", { hasText: "s0013" }).getByRole("button", { name: /^Release/ }).click();
   await hasText("#campaign-result", "s0013 is tried again");
   seen.queue = await page.locator("#queue tr").evaluateAll((rows) => rows.map((one) => one.cells[0].innerText));

@@ -136,7 +136,7 @@ def edit_campaign(campaign_id: str, request: EditRequest, context: Context, send
 
 @router.post("/campaigns/{campaign_id}/pause")
 def pause_campaign(campaign_id: str, request: CommandRequest, context: Context, sender: Sender) -> CampaignView:
-    """Pause at the next checkpoint of the run in progress, or at once between runs."""
+    """Pause at the next checkpoint of the run in progress, after a setup step, or at once between runs."""
     return _change(context, campaign_id, lambda state, now: pause(state, now, get_author(sender, request.who)))
 
 
@@ -150,10 +150,10 @@ def resume_campaign(campaign_id: str, request: CommandRequest, context: Context,
 def stop_campaign(
     campaign_id: str, request: StopCampaignRequest, context: Context, sender: Sender
 ) -> CampaignView:
-    """Stop after the run in progress; with `now`, that run is stopped in a controlled way, too."""
+    """Stop after the run or setup step in progress; with `now`, that is stopped in a controlled way, too."""
     who = get_author(sender, request.who)
     view = _change(context, campaign_id, lambda state, now: stop(state, now, who))
-    if request.now and view.phase in ("starting", "stroking"):
+    if request.now and view.phase in ("starting", "stroking", "preparing"):
         _stop_run(context, view.bench)
     return view
 

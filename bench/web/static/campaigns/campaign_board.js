@@ -35,7 +35,7 @@ function listFacts(campaign) {
     "Expected end": [end ? instant(end) : "–", end ? "without the time that persons take" : ""],
     "Time in motion": [duration(times.stroking_s), "of complete and incomplete runs"],
     "Time at rest": [duration(times.rest_s)],
-    "Time held": [duration(times.held_s), "paused, or waiting for a person, for results or for the bench"],
+    "Time held": [duration(times.held_s), "paused, in setup steps, or waiting for a person, for results or for the bench"],
     Temperature: [temperature === null ? "no reading" : `${fixed(temperature, 1)} °C`],
     Bench: [bench === "agent" ? "this bench" : bench],
     Operator: [operator || "not given"],

@@ -5,6 +5,7 @@ import { countStates, describeKind, hasEnded, markStep } from "./campaign_words.
 import { byId, element, instant, write } from "../common/format.js";
 import { keep, refresh } from "../common/refresh.js";
 import { need } from "../common/rights.js";
+import { QUANTITIES } from "../common/quantities.js";
 
 const FIRST = 30;
 const ENDED = ["done", "skipped", "failed", "held_back"];
@@ -20,6 +21,7 @@ export class CampaignQueue {
       this.show(this.campaign);
     });
     byId("step-kind").addEventListener("change", () => showFields());
+    byId("step-setup").addEventListener("change", () => showFields());
     byId("step-form").addEventListener("submit", (event) => {
       event.preventDefault();
       this.add();
@@ -40,6 +42,7 @@ export class CampaignQueue {
     this.showEnded(items.filter(({ state }) => ENDED.includes(state)));
     this.showPlaces(open.filter(({ state }) => state === "pending"));
     byId("step-form").hidden = hasEnded(campaign);
+    write(byId("step-position-unit"), QUANTITIES.displacement.unit);
   }
 
   showEnded(ended) {
@@ -110,16 +113,20 @@ export class CampaignQueue {
     const step = readStep(kind);
     const added = kind === "pause" && place !== "now" ? { edit: "pause", before: place || null, text: byId("step-text").value }
       : place === "now" ? { edit: "do_now", step } : { edit: "add", steps: [step], before: place || null };
-    return this.edit(added, place === "now" ? "The step is done next." : "The step was added.");
+    return this.edit(added, place === "now" ? describeNow(this.campaign) : "The step was added.");
   }
 }
 
-/** Shows the fields of the chosen kind of step. */
+/** Says when a step for now is done. */
+const describeNow = ({ status }) => `The step is done next${status === "paused" ? "; the campaign stays paused" : ""}.`;
+
+/** Shows the fields of the chosen kind of step, and the target of a move. */
 function showFields() {
   const kind = byId("step-kind").value;
+  const setup = byId("step-setup").value;
   for (const field of document.querySelectorAll("#step-form [data-kind]")) {
-    field.hidden = field.dataset.kind !== kind;
-    for (const input of field.querySelectorAll("input")) input.disabled = field.hidden;
+    field.hidden = field.dataset.kind !== kind || (field.dataset.setup ?? setup) !== setup;
+    for (const input of field.querySelectorAll("input, select")) input.disabled = field.hidden;
   }
 }
 
@@ -127,6 +134,12 @@ function readStep(kind) {
   const value = (id) => byId(id).value.trim();
   if (kind === "rest") return { rest: { seconds: Number(value("step-seconds")) } };
   if (kind === "pause") return { prompt: { text: value("step-text") } };
+  if (kind === "setup") return { setup: readSetup(value("step-setup")) };
   const drive = value("step-drive");
   return { run: { specimen: value("step-specimen"), method: value("step-method"), drive: drive === "" ? null : Number(drive) } };
+}
+
+/** Setup step of the form; the target of a move is entered in the unit of the page. */
+function readSetup(step) {
+  return step === "move" ? { step, position_m: byId("step-position").valueAsNumber / QUANTITIES.displacement.scale } : { step };
 }

@@ -5,11 +5,13 @@ import { element, spaced } from "../common/format.js";
 const ENDED = ["done", "stopped"];
 const STATUSES = { running: "good", pausing: "fair", paused: "fair", stopping: "fair", done: "good", stopped: "bad" };
 const PHASES = {
-  starting: "a run is about to begin", stroking: "a run is in progress", evaluating: "results are awaited",
+  starting: "a run or setup step is about to begin", stroking: "a run is in progress",
+  preparing: "a setup step is in progress", evaluating: "results are awaited",
   resting: "at rest", asking: "waits for a person",
 };
 const KINDS = {
   run: "run", rest: "rest", warm_up: "warm-up", repeat: "repeated run", next_stroke: "proposed strokes", prompt: "prompt",
+  setup: "setup step",
 };
 
 export const hasEnded = ({ status }) => ENDED.includes(status);

@@ -18,6 +18,8 @@ REST = {"rest": {"seconds": 60}}
         ([RUN, prompt_step("MOUNT it again"), RUN], {}, [1, 2]),
         ([RUN, prompt_step("Check the oil"), RUN], {}, [1, 1]),
         ([RUN, prompt_step(), RUN], {1: ("skipped", "deleted")}, [1, 1]),
+        ([RUN, {"setup": {"step": "tare"}}, RUN, {"setup": {"step": "mount"}}, RUN], {}, [1, 1, 2]),
+        ([RUN, {"setup": {"step": "mount"}}, RUN], {1: ("failed", "no reference")}, [1, 1]),
         ([prompt_step(), RUN, prompt_step(), prompt_step(), RUN], {}, [1, 2]),
         ([RUN, OTHER, RUN, RUN, OTHER], {}, [1, 1, 2, 2, 2]),
     ],

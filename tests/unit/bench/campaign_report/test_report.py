@@ -176,6 +176,18 @@ def test_steps_that_were_not_done_have_their_reasons(page):
     assert rows[1][2:] == ["held back", "held back after 2 crashes of the bench: killed"]
 
 
+def test_setup_steps_have_their_times_and_results(store, tmp_path):
+    steps = [{"setup": {"step": "tare"}}, RUN, {"setup": {"step": "home"}}, {"setup": {"step": "unmount"}}]
+    states = {0: ("done", "3.10 N are subtracted"), 2: ("failed", "no switch"), 3: ("pending", "")}
+    page = write(gather_campaign(store, store_campaign(store, steps, [], states)), tmp_path)
+    rows = find(page, "Setup steps")[1:]
+    assert [(row[0], row[1], row[4], row[5]) for row in rows] == [
+        ("s0001", "setup step tare", "done", "3.10 N are subtracted"),
+        ("s0003", "setup step home", "failed", "no switch"),
+    ]
+    assert rows[0][2:4] == ["2026-09-21 14:18:20 UTC", "2026-09-21 14:19:20 UTC"]
+
+
 def test_questions_and_answers_name_the_person_and_the_note(page):
     (row,) = find(page, "Answers of persons")[1:]
     assert (row[0], row[1], row[4], row[5], row[6]) == ("s0004", EVIL, "A. Meyer", "torque <b>12</b> N m", "–")

@@ -24,6 +24,7 @@ class SimulatedBench:
         self.obstacle = ""
         self.report = None
         self.answers = True
+        self.setup_reports, self.prepared = [], []
 
     def store(self, state):
         """Store a state as the catalogue does: as a document, without its messages."""
@@ -38,12 +39,21 @@ class SimulatedBench:
         )
         self.store(advance(self.state, seen, self.now, ID))
         active = self.state.active
-        if active is not None and active.phase == "starting":
+        if active is not None and active.execution is None and active.phase in ("starting", "preparing"):
+            self.prepare(active)
+        elif active is not None and active.phase == "starting":
             self.play(active.execution.log)
         elif self.state.active is not None and active.phase == "resting":
             self.now = active.deadline
         else:
             self.now += 1.0
+
+    def prepare(self, active):
+        """Execute a setup step; its reports are those of the test, the last one `ended`."""
+        if active.phase == "starting":
+            self.prepared.append(active.item)
+        self.now += 1.0
+        self.report = self.setup_reports.pop(0) if self.setup_reports else ExecutionReport(kind="ended")
 
     def play(self, log):
         assert log not in self.logs, "a log is never written twice"

@@ -7,7 +7,7 @@ from contextlib import suppress
 import pytest
 
 from bench import cli
-from bench.agent_protocol import InstrumentStatus, PauseCommand, RunCommand
+from bench.agent_protocol import InstrumentStatus, PauseCommand, PrepareCommand, RunCommand
 from bench.campaigns import CampaignStore, collect_methods, parse_campaign
 from bench.service.routes.planning import assessments
 from tests.support.certificates import make_certificate
@@ -464,3 +464,22 @@ def test_a_campaign_on_a_bench_that_is_not_served_is_reported_and_can_be_stopped
     service.post(f"/campaigns/{campaign.id}/stop", {}, 200)
     assert service.get(f"/campaigns/{campaign.id}")["status"] == "stopped"
     assert service.get("/health")["campaigns"] == "ok"
+
+
+def test_a_setup_step_is_done_on_the_bench_now_and_during_a_pause(service):
+    service.agent.setup = {"outcome": "done", "message": "3.10 N are subtracted from the force from now on"}
+    campaign = start(service, [{"rest": {"seconds": 5000}}, {"setup": {"step": "home"}}])
+    path = f"/campaigns/{campaign['id']}"
+    wait(service, campaign, lambda found: found["phase"] == "resting")
+    service.post(f"{path}/pause", {"who": "B"})
+    edit = {"edit": "do_now", "step": {"setup": {"step": "tare"}}}
+    assert service.client.patch(f"/api/v1{path}", json={"who": "B", "edit": edit}).status_code == 200
+    tared = wait(service, campaign, lambda found: found["items"][0]["state"] == "done")
+    assert (tared["items"][0]["kind"], tared["status"]) == ("setup", "paused")
+    assert tared["items"][0]["reason"] == service.agent.setup["message"]
+    assert wait_for_command(service, PrepareCommand).step == "tare"
+    service.agent.setup = {"outcome": "failed", "message": "the reference switch was not found"}
+    service.client.patch(f"/api/v1{path}", json={"edit": {"edit": "delete", "item": "s0001"}})
+    service.post(f"{path}/resume", {"who": "B"})
+    asked = wait(service, campaign, lambda found: found["question"])
+    assert asked["question"]["text"] == "setup step home has failed: the reference switch was not found"

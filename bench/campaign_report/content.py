@@ -8,6 +8,7 @@ from functools import cached_property
 from bench.campaign_report.causes import TrendDocument, list_trends
 from bench.campaign_report.drift import DriftLine, find_outliers, fit_drift
 from bench.campaign_report.mountings import number_mountings
+from bench.campaign_report.photos import make_photos
 from bench.campaign_report.scatter import Scatter, analyse_scatter
 from bench.campaigns import (
     CampaignState,
@@ -23,6 +24,7 @@ from bench.campaigns import (
     make_view,
     read_result,
 )
+from bench.report.layout import Picture
 
 MAX_EVENTS = 20_000
 """Largest number of events that a report reads, the newest ones."""
@@ -109,6 +111,8 @@ class CampaignReport:
     cells: Sequence[Cell]
     trends: Mapping[str, TrendDocument | None] = field(default_factory=dict)
     """Trend by specimen."""
+    photos: Mapping[str, Picture] = field(default_factory=dict)
+    """Photos of the answers that can be shown, by the id of their step."""
 
     @property
     def series(self) -> list[Series]:
@@ -147,6 +151,7 @@ def gather_campaign(store: CampaignStore, campaign: StoredCampaign) -> CampaignR
         starts={run: row.started for run, row in rows.items() if row is not None} | _estimate_starts(state, rows),
         cells=_make_cells(state, units, numbers, mountings),
         trends=list_trends(catalogue, _group_by_specimen(facts)),
+        photos=make_photos(state, catalogue.folder),
     )
 
 

@@ -5,6 +5,7 @@ from datetime import datetime
 
 from bench.campaign_report.content import CampaignReport
 from bench.campaign_report.mountings import MOUNTING_RULE
+from bench.campaign_report.photos import name_photo
 from bench.campaigns import ItemView, RunFact
 from bench.report import format_name, format_significant
 from bench.report.layout import Section, Table
@@ -136,7 +137,11 @@ def make_answers(report: CampaignReport) -> Section:
     header = ("Step", "Question", "Asked", "Answered", "By", "Note", "Photo")
     table = Table(rows, header, (2, 5, 4, 4, 3, 5, 3), "Answers of persons")
     texts = [] if rows else ["No person was asked."]
-    return Section("Questions and answers", texts, [table] if rows else [])
+    if lost := [item for item in report.state.items if item.photo and item.id not in report.photos]:
+        names = ", ".join(f"{item.photo} of step {item.id}" for item in lost)
+        texts.append(f"Not shown, because they are missing, unreadable or too many: {names}.")
+    pictures = [name_photo(item) for item in report.photos]
+    return Section("Questions and answers", texts, [table] if rows else [], pictures)
 
 
 def _list_answers(report: CampaignReport) -> Iterator[Row]:

@@ -7,6 +7,7 @@ from typing import Any, Literal, TypeAlias, get_args
 
 from bench.campaign_report.content import CampaignReport
 from bench.campaign_report.findings import make_findings, make_key_figures
+from bench.campaign_report.photos import name_photo
 from bench.campaign_report.plots import make_pictures
 from bench.campaign_report.record import (
     make_answers,
@@ -53,7 +54,8 @@ def write_campaign_report(
     Raises:
         ReportError: the file cannot be written.
     """
-    pictures = make_pictures(report)
+    photos = {name_photo(item): photo for item, photo in report.photos.items()}
+    pictures = make_pictures(report) | photos
     origin = f"Created {created_at:%Y-%m-%d %H:%M} UTC with mrbench {version('mrbench')}"
     if report_format == "html":
         path.write_text(_render(report, pictures, origin, command), encoding="utf-8")

@@ -51,6 +51,7 @@ from bench.campaigns.engine import (
     stop,
 )
 from bench.campaigns.notifications import NotificationSender, send_due, send_test
+from bench.campaigns.photos import decode_photo, get_media_type, read_photo, save_photo
 from bench.campaigns.runner import CampaignRunner, lock_campaign
 from bench.campaigns.store import SIMULATED, CampaignStore, StoredCampaign
 from bench.campaigns.view import CampaignView, ItemView, TrendPoint, TrendView, make_trends, make_view
@@ -93,11 +94,13 @@ __all__ = [
     "collect_edit_methods",
     "collect_methods",
     "collect_step_methods",
+    "decode_photo",
     "expand_campaign",
     "find_problems",
     "find_shipped_method",
     "format_plan",
     "format_view",
+    "get_media_type",
     "get_step_kind",
     "group_runs",
     "load_campaign",
@@ -111,8 +114,10 @@ __all__ = [
     "pause",
     "plan_campaign",
     "prefer_methods",
+    "read_photo",
     "read_result",
     "resume",
+    "save_photo",
     "send_due",
     "send_test",
     "stop",

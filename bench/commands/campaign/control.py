@@ -19,7 +19,9 @@ from bench.campaigns import (
     parse_choice,
     parse_edit,
     pause,
+    read_photo,
     resume,
+    save_photo,
     send_due,
     send_test,
     stop,
@@ -41,6 +43,7 @@ def control(
     choice: str | None,
     edit: str,
     as_json: bool,
+    photo: Path | None = None,
 ) -> None:
     """Show or change a campaign.
 
@@ -53,6 +56,7 @@ def control(
         choice: decision on a failed step, with resume.
         edit: edit of the queue as JSON, with edit.
         as_json: print JSON instead of text.
+        photo: file of the photo that answers a prompt, with resume.
 
     Raises:
         BenchError: there is no such campaign, or the command is not possible in its state.
@@ -67,10 +71,12 @@ def control(
         if action == "edit":
             campaign = store.edit(campaign.id, parse_edit(edit, "--edit"), now, operator)
         elif action != "status":
-            change = _make_change(action, campaign, operator, now, note, choice)
+            kept = "" if photo is None else save_photo(store.catalogue.folder, campaign, read_photo(photo))
+            change = _make_change(action, campaign, operator, now, note, choice, kept)
             campaign = store.update(campaign.id, change)
         if action != "status":
-            new = {"operator": operator, "note": note, "choice": choice, "edit": edit}
+            given = None if photo is None else str(photo)
+            new = {"operator": operator, "note": note, "choice": choice, "edit": edit, "photo": given}
             record(data, f"campaign {action}", campaign.id, {"status": before}, new)
         view = make_view(campaign, store.table.list_newest_events(campaign.id, _EVENTS))
         typer.echo(view.model_dump_json(indent=2) if as_json else "\n".join(format_view(view)))
@@ -79,16 +85,17 @@ def control(
 
 
 def _make_change(
-    action: str, campaign: StoredCampaign, who: str, now: float, note: str | None, choice: str | None
+    action: str, campaign: StoredCampaign, who: str, now: float, note: str | None, choice: str | None, photo: str
 ) -> Callable[[CampaignState], CampaignState]:
     if action == "pause":
         return lambda state: pause(state, now, who)
     if action == "stop":
         return lambda state: stop(state, now, who)
-    is_answer = note is not None or choice is not None or campaign.state.needs_person
-    if is_answer and campaign.state.status == "running":
+    # A step that is done during a pause may ask, too; without an answer, resume ends the pause.
+    is_given, is_asked = note is not None or choice is not None or bool(photo), campaign.state.needs_person
+    if (is_asked and is_given) or ((is_asked or is_given) and campaign.state.status == "running"):
         decision = parse_choice(choice)
-        return lambda state: answer(state, now, who, note or "", choice=decision)
+        return lambda state: answer(state, now, who, note or "", photo, decision)
     return lambda state: resume(state, now, who)
 
 

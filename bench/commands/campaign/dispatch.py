@@ -58,6 +58,10 @@ def campaign(
     answer: Annotated[
         str | None, typer.Option(metavar="NOTE", help="With resume: answer the prompt with this note.")
     ] = None,
+    photo: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="With resume: photo that the prompt needs, JPEG or PNG."),
+    ] = None,
     choice: Annotated[
         str | None, typer.Option(metavar="retry|skip|stop", help="With resume: decide on a failed step.")
     ] = None,
@@ -80,6 +84,8 @@ def campaign(
         raise typer.BadParameter("a report cannot be printed; give a file: --out report.html or report.pdf")
     if (action is Action.EDIT) != bool(edit):
         raise typer.BadParameter("edit needs --edit JSON, and no other action takes it")
+    if photo is not None and action is not Action.RESUME:
+        raise typer.BadParameter("--photo answers a prompt; use it with resume")
     if action is Action.PLAN:
         from bench.commands.campaign.plan import plan
 
@@ -95,7 +101,17 @@ def campaign(
     else:
         from bench.commands.campaign.control import control
 
-        control(action.value, target, data, operator, note=answer, choice=choice, edit=edit, as_json=as_json)
+        control(
+            action.value,
+            target,
+            data,
+            operator,
+            note=answer,
+            choice=choice,
+            edit=edit,
+            as_json=as_json,
+            photo=photo,
+        )
 
 
 def _run(

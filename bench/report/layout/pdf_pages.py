@@ -99,5 +99,5 @@ def _write_table(document: _Document, table: Table) -> None:
 def _write_pictures(document: _Document, pictures: Iterable[Picture]) -> None:
     for picture in pictures:
         _write_text(document, picture.title, _TEXT_SIZE + 1, bold=True)
-        document.image(BytesIO(picture.png), w=document.epw, alt_text=picture.title)
+        document.image(BytesIO(picture.content), w=picture.width * document.epw, alt_text=picture.title)
         _write_text(document, picture.caption, _TABLE_SIZE)

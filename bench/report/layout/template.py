@@ -8,16 +8,25 @@ from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 
 @dataclass(frozen=True)
 class Picture:
-    """One plot of a report."""
+    """One plot or photo of a report."""
 
     title: str
     caption: str
-    png: bytes
+    content: bytes
+    """Image file."""
+    media_type: str = "image/png"
+    width: float = 1.0
+    """[1] Part of the text's width that it fills on paper."""
 
     @property
     def data(self) -> str:
-        """PNG in base64."""
-        return base64.b64encode(self.png).decode()
+        """Image file in base64."""
+        return base64.b64encode(self.content).decode()
+
+    @property
+    def kind(self) -> str:
+        """Class of the figure on a page: plot or photo."""
+        return "plot" if self.media_type == "image/png" else "photo"
 
 
 def make_environment(package: str) -> Environment:

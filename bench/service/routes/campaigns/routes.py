@@ -19,12 +19,15 @@ from bench.campaigns import (
     StoredCampaign,
     answer,
     collect_methods,
+    decode_photo,
     expand_campaign,
+    get_media_type,
     make_view,
     parse_campaign,
     pause,
     plan_campaign,
     resume,
+    save_photo,
     send_test,
     stop,
 )
@@ -36,7 +39,6 @@ from bench.service.context import Context, ServiceContext
 from bench.service.files import SnapshotResponse, describe_file
 from bench.service.problems import make_conflict, make_not_found
 from bench.service.requests import IDEMPOTENT, IdempotentRoute, Sender, get_author, get_operator
-from bench.service.routes.campaigns.photos import get_media_type, save_photo
 from bench.service.routes.campaigns.views import (
     AnswerRequest,
     CampaignPage,
@@ -169,10 +171,8 @@ def _stop_run(context: ServiceContext, executor: str) -> None:
 def answer_campaign(campaign_id: str, request: AnswerRequest, context: Context, sender: Sender) -> CampaignView:
     """Answer a prompt with a note and a photo, or decide on a failed step."""
     stored = _get(context.campaign_store, campaign_id)
-    active = stored.state.active
-    photo, who = "", get_author(sender, request.who)
-    if request.photo and active is not None and stored.state.needs_person:
-        photo = save_photo(context.data, f"{campaign_id}-{active.item}-photo", request.photo)
+    who = get_author(sender, request.who)
+    photo = save_photo(context.data, stored, decode_photo(request.photo)) if request.photo else ""
     return _change(
         context,
         campaign_id,

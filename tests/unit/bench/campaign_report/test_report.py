@@ -4,8 +4,10 @@ import json
 import re
 from datetime import UTC, datetime
 from html.parser import HTMLParser
+from io import BytesIO
 
 import pytest
+from PIL import Image
 from pypdf import PdfReader
 from scipy.stats import linregress
 
@@ -191,6 +193,26 @@ def test_setup_steps_have_their_times_and_results(store, tmp_path):
 def test_questions_and_answers_name_the_person_and_the_note(page):
     (row,) = find(page, "Answers of persons")[1:]
     assert (row[0], row[1], row[4], row[5], row[6]) == ("s0004", EVIL, "A. Meyer", "torque <b>12</b> N m", "–")
+
+
+def test_the_photos_of_answers_are_shown_and_what_cannot_be_shown_is_named(store, tmp_path):
+    stored = store_campaign(store, [prompt_step("Show <it>"), prompt_step("Show that"), RUN], [])
+    for number, name in enumerate(("upright.png", "broken.jpg")):
+        item = stored.state.items[number].model_copy(update={"photo": name})
+        items = (*stored.state.items[:number], item, *stored.state.items[number + 1 :])
+        stored = stored._replace(state=stored.state.model_copy(update={"items": items}))
+    Image.new("RGBA", (1500, 3000), "red").save(store.catalogue.folder / "upright.png")
+    (store.catalogue.folder / "broken.jpg").write_bytes(b"\xff\xd8\xff\xe0 no photo")
+    report = gather_campaign(store, stored)
+    photo = report.photos["s0001"]
+    assert Image.open(BytesIO(photo.content)).size == (600, 1200)
+    assert photo.width == pytest.approx(0.3)
+    page = write(report, tmp_path)
+    assert page.source.count('<figure class="photo">') == page.source.count("data:image/jpeg;base64,") == 1
+    assert 'alt="Photo to step s0001: Show &lt;it&gt;"' in page.source
+    assert "Not shown, because they are missing, unreadable or too many: broken.jpg of step s0002." in page.text
+    write_campaign_report(report, "pdf", tmp_path / "report.pdf", "", CREATED)
+    assert sum(len(one.images) for one in PdfReader(tmp_path / "report.pdf").pages) == 1
 
 
 def test_messages_have_no_restore_points(page):

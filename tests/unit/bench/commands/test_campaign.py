@@ -7,7 +7,9 @@ import pytest
 from typer import BadParameter
 
 from bench import cli
+from bench.audit import AUDIT_FILE
 from bench.campaigns import CampaignError, collect_methods, load_campaign
+from bench.campaigns.engine import Observation, advance
 from bench.campaigns.engine.edits import AddEdit
 from bench.commands.campaign.bench import check_served, find_or_create
 from bench.commands.campaign.catalogue import open_store
@@ -133,6 +135,65 @@ def test_the_simulated_plant_needs_no_approval(tmp_path):
         document = load_campaign(write(tmp_path / "a.json", steps=[RUN], methods="approved"))
         made = store.create(document, collect_methods(document), "scenario default", 1.0)
         assert len(store.edit(made.id, AddEdit(edit="add", steps=(RUN,)), 2.0).state.items) == 2
+
+
+def store_question(data, *, photo=True, count=1):
+    """Store a campaign that asks for a photo, and return its id."""
+    steps = [{"prompt": {"text": "Show the clevis", "photo": photo}}] * count
+    write(data / "ask.json", steps=steps)
+    with open_store(data, is_created=True) as store:
+        made = find_or_create(store, data / "ask.json", "B", "agent")
+        store.update(made.id, lambda state: advance(state, Observation(), state.updated, made.id))
+    return made.id
+
+
+def test_a_prompt_is_answered_with_a_photo_by_the_command_line(tmp_path, capsys):
+    asked, picture = store_question(tmp_path), tmp_path / "clevis.jpeg"
+    command = ["campaign", "resume", "--data", str(tmp_path), "--out", "-", "--photo", str(picture)]
+
+    def run(*more):
+        with pytest.raises(SystemExit) as end:
+            cli.main([*command, *more])
+        return end.value.code, capsys.readouterr()
+
+    refused = {
+        None: "cannot be read (No such",
+        b"GIF89a": "neither JPEG nor PNG",
+        b"x" * 3_000_001: "at most 3 MB",
+    }
+    for content, words in refused.items():
+        if content is not None:
+            picture.write_bytes(content)
+        code, printed = run()
+        assert code == 1
+        assert words in printed.err
+        assert "nothing was answered" in printed.err
+    picture.write_bytes(b"\xff\xd8\xff\xe0 a photo")
+    code, printed = run("--operator", "B")
+    assert not code
+    answered = json.loads(printed.out)["items"][0]
+    assert (answered["state"], answered["photo"]) == ("done", f"{asked}-s0001-photo.jpg")
+    assert (tmp_path / answered["photo"]).read_bytes() == picture.read_bytes()
+    assert list_all(tmp_path / AUDIT_FILE)[-1].new["photo"] == str(picture)
+    code, printed = run()
+    assert "asks for nothing" in printed.err
+
+
+def test_a_photo_is_taken_only_with_resume_and_an_answer_also_during_a_pause(tmp_path, capsys):
+    asked = store_question(tmp_path, photo=False)
+    with pytest.raises(SystemExit) as end:
+        cli.main(["campaign", "pause", "--data", str(tmp_path), "--photo", "a.jpg"])
+    assert end.value.code
+    assert "use it with resume" in capsys.readouterr().err
+    given = {"edit": "", "choice": None, "as_json": True}
+    control("pause", "", tmp_path, "B", note=None, **given)
+    control("resume", "", tmp_path, "B", note="tight", **given)
+    with open_store(tmp_path) as store:
+        state = store.get(asked).state
+    assert (state.status, state.items[0].note) == ("paused", "tight")
+    control("resume", "", tmp_path, "B", note=None, **given)
+    with open_store(tmp_path) as store:
+        assert store.get(asked).state.status == "running"
 
 
 def test_the_newest_campaign_is_reported_without_a_service(tmp_path, capsys):

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from functools import cached_property
 
+from bench.campaign_report.calibration import RunCalibration, read_calibrations
 from bench.campaign_report.causes import TrendDocument, list_trends
 from bench.campaign_report.drift import DriftLine, find_outliers, fit_drift
 from bench.campaign_report.mountings import number_mountings
@@ -111,6 +112,8 @@ class CampaignReport:
     cells: Sequence[Cell]
     trends: Mapping[str, TrendDocument | None] = field(default_factory=dict)
     """Trend by specimen."""
+    calibrations: Mapping[str, RunCalibration] = field(default_factory=dict)
+    """Calibration by the id of each complete run."""
     photos: Mapping[str, Picture] = field(default_factory=dict)
     """Photos of the answers that can be shown, by the id of their step."""
 
@@ -151,6 +154,7 @@ def gather_campaign(store: CampaignStore, campaign: StoredCampaign) -> CampaignR
         starts={run: row.started for run, row in rows.items() if row is not None} | _estimate_starts(state, rows),
         cells=_make_cells(state, units, numbers, mountings),
         trends=list_trends(catalogue, _group_by_specimen(facts)),
+        calibrations=read_calibrations(catalogue, numbers),
         photos=make_photos(state, catalogue.folder),
     )
 

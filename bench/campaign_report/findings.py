@@ -1,5 +1,6 @@
 """Findings at the top of a campaign report, and its key figures."""
 
+from bench.campaign_report.calibration_sections import make_calibration_warnings
 from bench.campaign_report.content import CampaignReport, Cell
 from bench.campaign_report.record import NOT_DONE, format_duration
 from bench.campaign_report.results import compute_fit_ratio
@@ -12,6 +13,7 @@ _SCATTER_RATIO = 2.0
 def make_findings(report: CampaignReport) -> list[Finding]:
     """Return the findings on a campaign."""
     found = [_describe_state(report), *_describe_steps(report), *_describe_identification(report)]
+    found += make_calibration_warnings(report)
     for cell in report.cells:
         found += [*_describe_drift(cell), *_describe_outliers(cell), *_describe_scatter(cell)]
     return found

@@ -5,6 +5,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Literal, TypeAlias, get_args
 
+from bench.campaign_report.calibration_sections import make_calibrated_results, make_calibration
 from bench.campaign_report.content import CampaignReport
 from bench.campaign_report.findings import make_findings, make_key_figures
 from bench.campaign_report.photos import name_photo
@@ -28,8 +29,10 @@ def make_sections(report: CampaignReport) -> list[Section]:
     """Make the sections after the summary, in order."""
     return [
         make_conditions(report),
+        make_calibration(report),
         make_errors(report),
         make_results(report),
+        make_calibrated_results(report),
         make_trends(report),
         make_scatter(report),
         make_steps(report),

@@ -3,8 +3,7 @@
 from typing import NamedTuple
 
 from bench.calibration import CombinedInterval, combine_estimates, read_entry
-from bench.log import Log
-from bench.report.calibration.certificates import RECORD
+from bench.report.calibration.certificates import RECORD, Metadata
 from bench.report.documents import Fit
 from bench.report.values import format_percent, format_quantity, format_unit
 
@@ -18,15 +17,15 @@ class CombinedRow(NamedTuple):
     calibration: str
 
 
-def make_combined_rows(log: Log, fit: Fit, sha256: str) -> list[CombinedRow]:
+def make_combined_rows(metadata: Metadata, fit: Fit, sha256: str) -> list[CombinedRow]:
     """Make the rows of the parameters with the calibration; none unless the fit used this log alone.
 
     Args:
-        log: recording.
+        metadata: metadata of the log by record.
         fit: identified damper.
         sha256: hash of the log.
     """
-    record, sharpness = log.metadata.get(RECORD, {}), fit.parameters.get("n")
+    record, sharpness = metadata.get(RECORD, {}), fit.parameters.get("n")
     is_only_log = list(fit.provenance.logs.values()) == [sha256]
     if sharpness is None or not is_only_log or not any(read_entry(text) for text in record.values()):
         return []

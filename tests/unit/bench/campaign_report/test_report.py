@@ -1,8 +1,9 @@
 """Report on a campaign as page and PDF: content, escaping, and campaigns without results."""
 
+import hashlib
 import json
 import re
-from datetime import UTC, datetime
+from datetime import UTC, date, datetime
 from html.parser import HTMLParser
 from io import BytesIO
 
@@ -11,13 +12,17 @@ from PIL import Image
 from pypdf import PdfReader
 from scipy.stats import linregress
 
+from bench.calibration import make_check_record, make_log_text
 from bench.campaign_report import gather_campaign, write_campaign_report
 from bench.campaign_report.causes import TrendDocument, describe_trend, find_trend
 from bench.catalogue import JobRow, RunRow
 from bench.commands.campaign.catalogue import open_store
 from bench.errors import ReportError
-from bench.jobs import TREND_FILE
+from bench.jobs import FIT_FILE, TREND_FILE
 from tests.support.campaign_reports import make_result, prompt_step, run_step, store_campaign
+from tests.support.certificates import issue_certificate
+from tests.support.reports import write_log
+from tests.support.result_documents import estimate, fit_document
 
 CREATED = datetime(2026, 5, 4, 3, 2, tzinfo=UTC)
 EVIL = 'Remount <script>alert("x")</script> & go'
@@ -280,6 +285,53 @@ def test_runs_with_proposed_strokes_do_not_count_as_repetitions(store):
     (series,) = gather_campaign(store, stored._replace(state=stored.state.model_copy(update=values))).series
     assert series.values == (2600.0, 9999.0, 2602.0)
     assert (series.scatter.runs, series.scatter.mean) == (2, 2601.0)
+
+
+def add_calibrated_run(store, run, **record):
+    """Add a run with the metadata of the test to the catalogue, with a fit of its own; return its fit."""
+    log = write_log(store.catalogue.folder / f"{run}.mcap", **record)
+    sha256 = hashlib.sha256(log.read_bytes()).hexdigest()
+    document = fit_document(sha256)
+    added = {"n": estimate(2.0, "1", [1.9, 2.1]), "k0": estimate(2000.0, "N/m", [1990.0, 2010.0])}
+    document["parameters"] |= added
+    result = store.catalogue.folder / f"{run}-fit"
+    result.mkdir()
+    (result / FIT_FILE).write_text(json.dumps(document))
+    store.catalogue.add(RunRow(id=run, method="quick", started=CREATED, state="ended", log=log.name,
+                               log_sha256=sha256))  # fmt: skip
+    store.catalogue.add(JobRow(id=f"{run}-job", run_id=run, kind="identify", key=run, settings={}, state="done",
+                               created=CREATED, finished=CREATED, result=result.name))  # fmt: skip
+
+
+def test_the_calibration_of_the_runs_and_the_intervals_with_it_are_stated(tmp_path):
+    day = date(2026, 5, 4)
+    force = make_log_text(issue_certificate(date="2025-05-01", due="2026-05-01"), day, "")
+    way = make_log_text(issue_certificate("displacement", "m", date="2025-05-01", due="2027-05-01"), day, "")
+    failed = "force: no zero check yet; one is due every 7 days"
+    with open_store(tmp_path, is_created=True) as store:
+        stored = store_campaign(store, [RUN] * 5, [])
+        for number in range(3):
+            calibration = {"force": force, "coil_drive": "none given"}
+            if number:
+                calibration["displacement"] = way
+            checks = make_check_record((), [failed] if number == 2 else [])
+            add_calibrated_run(store, f"fact-{number}", calibration=calibration, checks=checks)
+        add_calibrated_run(store, "fact-3", calibration={"force": "none given"})
+        report = gather_campaign(store, stored)
+    page = write(report, tmp_path)
+    rows = find(page, "Certificates at the start")[1:]
+    assert [(row[0], row[6], row[7]) for row in rows] == [
+        ("force", "overdue", "1–3"), ("displacement", "valid", "2–3"),
+    ]  # fmt: skip
+    overdue = "force: calibration overdue since 2026-05-01 (certificate 4711 of PTB Braunschweig)."
+    assert find(page, "Overdue channels")[1:] == [[overdue, "1–3"], [f"{failed}.", "3"]]
+    assert f"{failed} (run 3)." in page.text
+    assert "name no certificate: run 4." in page.text
+    assert "cannot be read, so that only deficiencies are known: run 5." in page.text
+    table = find(page, "Intervals with calibration, MR-1")
+    assert table[0] == ["Parameter", "Unit", "Run 1", "Run 2", "Run 3"]
+    row = next(row for row in table if row[0] == "k0")
+    assert row[1:] == ["N/m", "– (no certificate of displacement)", "2000 ± 15 (0.28 %)", "2000 ± 15 (0.28 %)"]
 
 
 def test_the_trend_of_a_specimen_is_found_by_its_newest_run(store, tmp_path):

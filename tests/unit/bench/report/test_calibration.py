@@ -35,30 +35,30 @@ def make_fit(sha256):
 def combine(folder, **record):
     path = write_log(folder / "strokes.mcap", calibration=make_record(**record))
     sha256 = hashlib.sha256(path.read_bytes()).hexdigest()
-    rows = make_combined_rows(read_log(path), Fit.model_validate(make_fit(sha256)), sha256)
+    rows = make_combined_rows(read_log(path).metadata, Fit.model_validate(make_fit(sha256)), sha256)
     return {row.name: row for row in rows}
 
 
 def test_certificates_are_listed_and_an_overdue_one_is_a_warning(tmp_path):
     log = read_log(write_log(tmp_path / "strokes.mcap", calibration=make_record()))
-    force, displacement = make_calibration_rows(log)
+    force, displacement = make_calibration_rows(log.metadata)
     assert force[:4] == ("force", "4711, PTB Braunschweig (version 1)", "2025-05-01", "2026-05-01")
     assert force[4:] == ("0.20 % (k = 1)", "0.30 %", "overdue")
     assert (displacement.channel, displacement.state) == ("displacement", "valid")
-    assert make_calibration_findings(log) == [("warning", OVERDUE)]
+    assert make_calibration_findings(log.metadata) == [("warning", OVERDUE)]
 
 
 def test_a_failed_check_is_a_warning(tmp_path):
     text = "force: no zero check yet; one is due every 7 days"
     path = write_log(tmp_path / "strokes.mcap", checks=make_check_record((), [text]))
-    assert make_calibration_findings(read_log(path)) == [("warning", f"{text}.")]
+    assert make_calibration_findings(read_log(path).metadata) == [("warning", f"{text}.")]
 
 
 def test_a_log_without_certificates_has_neither_rows_nor_findings(tmp_path):
     path = write_log(tmp_path / "strokes.mcap", calibration={"force": "none given"})
     log, sha256 = read_log(path), hashlib.sha256(path.read_bytes()).hexdigest()
-    assert make_calibration_rows(log) == make_calibration_findings(log) == []
-    assert make_combined_rows(log, Fit.model_validate(make_fit(sha256)), sha256) == []
+    assert make_calibration_rows(log.metadata) == make_calibration_findings(log.metadata) == []
+    assert make_combined_rows(log.metadata, Fit.model_validate(make_fit(sha256)), sha256) == []
 
 
 def test_intervals_grow_by_the_gains_that_a_parameter_has(tmp_path):
@@ -78,7 +78,7 @@ def test_a_missing_certificate_is_named(tmp_path):
 
 def test_a_fit_of_further_logs_has_no_combined_intervals(tmp_path):
     log = read_log(write_log(tmp_path / "strokes.mcap", calibration=make_record()))
-    assert make_combined_rows(log, Fit.model_validate(make_fit("another")), "this") == []
+    assert make_combined_rows(log.metadata, Fit.model_validate(make_fit("another")), "this") == []
 
 
 @pytest.fixture

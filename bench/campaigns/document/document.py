@@ -20,6 +20,7 @@ from bench.campaigns.document.errors import CampaignDocumentError
 from bench.campaigns.document.steps import (
     STEP_KINDS,
     BenchSetupStep,
+    CellRepeatStep,
     DiagnosisGoal,
     IntervalGoal,
     NextStrokeStep,
@@ -28,11 +29,17 @@ from bench.campaigns.document.steps import (
     RestStep,
     RunStep,
     WarmUpStep,
+    find_unfounded_step,
     get_step_kind,
 )
 from bench.validation import FrozenModel, format_position, get_first_error
 
 OnFailure: TypeAlias = Literal["retry", "skip", "stop", "ask"]
+_BY_KIND = Discriminator(
+    get_step_kind,
+    custom_error_type="step_kind",
+    custom_error_message=f"a step has exactly one of the keys {', '.join(STEP_KINDS)}",
+)
 AnyStep: TypeAlias = Annotated[
     Annotated[RunStep, Tag("run")]
     | Annotated[RestStep, Tag("rest")]
@@ -41,13 +48,20 @@ AnyStep: TypeAlias = Annotated[
     | Annotated[NextStrokeStep, Tag("next_stroke")]
     | Annotated[PromptStep, Tag("prompt")]
     | Annotated[BenchSetupStep, Tag("setup")],
-    Discriminator(
-        get_step_kind,
-        custom_error_type="step_kind",
-        custom_error_message=f"a step has exactly one of the keys {', '.join(STEP_KINDS)}",
-    ),
+    _BY_KIND,
 ]
 """A step, recognised by its only key."""
+CellStep: TypeAlias = Annotated[
+    Annotated[RunStep, Tag("run")]
+    | Annotated[RestStep, Tag("rest")]
+    | Annotated[WarmUpStep, Tag("warm_up")]
+    | Annotated[CellRepeatStep, Tag("repeat")]
+    | Annotated[NextStrokeStep, Tag("next_stroke")]
+    | Annotated[PromptStep, Tag("prompt")]
+    | Annotated[BenchSetupStep, Tag("setup")],
+    _BY_KIND,
+]
+"""A step after the run of a cell, which can repeat that run."""
 
 
 class Matrix(FrozenModel):
@@ -70,6 +84,18 @@ class Matrix(FrozenModel):
         default=(), description="Steps before the first run of each specimen, such as a prompt to mount it."
     )
     before_run: tuple[AnyStep, ...] = Field(default=(), description="Steps before each run, such as a rest.")
+    after_run: tuple[CellStep, ...] = Field(
+        default=(),
+        description="Steps after each run, such as next_stroke, or first a repeat without step of the run itself.",
+    )
+
+    @model_validator(mode="after")
+    def _check_repeats(self) -> Self:
+        if any(isinstance(step, CellRepeatStep) and step.repeat.step is None for step in self.after_run[1:]):
+            raise ValueError(
+                "a repeat without step must be the first of after_run, because the run of the cell begins it"
+            )
+        return self
 
 
 class MatrixSteps(FrozenModel):
@@ -152,11 +178,8 @@ class Campaign(FrozenModel):
             return self
         if not self.steps:
             raise ValueError("a campaign needs at least one step")
-        seen = False
-        for number, step in enumerate(self.steps, 1):
-            if isinstance(step, NextStrokeStep) and not seen:
-                raise ValueError(f"step {number} is a next_stroke, but no run precedes it; put a run before it")
-            seen = seen or isinstance(step, RunStep | RepeatStep)
+        if (number := find_unfounded_step(self.steps)) is not None:
+            raise ValueError(f"step {number} is a next_stroke, but no run precedes it; put a run before it")
         return self
 
     def to_document(self) -> dict[str, Any]:

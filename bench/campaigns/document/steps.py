@@ -1,5 +1,6 @@
 """Steps of a campaign: each is an object with one key, the kind of the step."""
 
+from collections.abc import Iterable
 from typing import Any, Literal, Self, TypeAlias
 
 from pydantic import Field, PositiveFloat, PositiveInt, model_validator
@@ -111,6 +112,27 @@ class RepeatStep(FrozenModel):
     repeat: RepeatSpec = Field(description="Repetition of a run until a goal is reached.")
 
 
+class CellRepeatSpec(FrozenModel):
+    """Repetition after the run of a cell of a matrix, by default of that run itself."""
+
+    step: RunStep | None = Field(
+        default=None, description="Run to repeat; null for the run of the cell, which is then the first of these."
+    )
+    until: IntervalGoal | DiagnosisGoal = Field(description="Goal at which the repetition ends.")
+    at_most: PositiveInt = Field(le=100, description="[1] largest number of runs.")
+
+
+class CellRepeatStep(FrozenModel):
+    """Repetition after the run of a cell."""
+
+    repeat: CellRepeatSpec = Field(description="Repetition of a run, by default that of the cell, until a goal.")
+
+    def make_step(self, run: RunStep) -> RepeatStep:
+        """Return the step of a cell with a run."""
+        spec = self.repeat
+        return RepeatStep(repeat=RepeatSpec(step=spec.step or run, until=spec.until, at_most=spec.at_most))
+
+
 class NextStrokeSpec(FrozenModel):
     """Runs with the strokes that the diagnosis proposes."""
 
@@ -184,6 +206,16 @@ def describe_setup(spec: SetupSpec) -> str:
 def estimate_setup_duration(spec: SetupSpec) -> float:
     """Return the expected duration of a setup step [s]; that of a motion depends on the bench."""
     return SETUP_MOTION_TIME if spec.step in MOVING_STEPS else SETUP_TIME
+
+
+def find_unfounded_step(steps: Iterable[Step]) -> int | None:
+    """Return the number, from 1, of the first next_stroke that no run precedes; None without one."""
+    has_run = False
+    for number, step in enumerate(steps, 1):
+        if isinstance(step, NextStrokeStep) and not has_run:
+            return number
+        has_run = has_run or find_run(step) is not None
+    return None
 
 
 def find_run(step: Step) -> RunSpec | None:

@@ -48,11 +48,16 @@ def make_method(state: CampaignState, item: Item, methods: Methods) -> Method:
 
 
 def find_base_run(state: CampaignState, item: Item) -> str:
-    """Return the id of the latest complete run that a `next_stroke` item builds on; empty without one."""
+    """Return the id of the latest complete run that a `next_stroke` item builds on; empty without one.
+
+    It is a run of the nearest preceding step with a method of its own, or of a `next_stroke` since.
+    """
     if item.runs:
         return item.runs[-1]
     before = state.items[: state.items.index(item)]
-    runs = [one.runs[-1] for one in before if one.runs and not isinstance(one.step, WarmUpStep)]
+    # The runs of an earlier step may be those of another specimen.
+    first = max((index for index, one in enumerate(before) if find_run(one.step) is not None), default=0)
+    runs = [one.runs[-1] for one in before[first:] if one.runs and not isinstance(one.step, WarmUpStep)]
     return runs[-1] if runs else ""
 
 

@@ -97,6 +97,53 @@ def test_steps_before_specimens_and_runs_are_added():
     assert kinds == ["prompt", "rest", "run", "rest", "run"] * 2
 
 
+CELL_REPEAT = {"repeat": {"until": {"parameter": "k0", "ci_percent": 2}, "at_most": 4}}
+NEXT = {"next_stroke": {"at_most": 2}}
+
+
+def expand_matrix(**more):
+    matrix = {"specimens": ["A", "B"], "methods": ["quick"], "drives": [0.1, 0.2], **more}
+    return expand_campaign(campaign({"matrix": matrix}))
+
+
+def test_steps_follow_the_run_of_each_cell():
+    steps = expand_matrix(before_run=[{"rest": {"seconds": 5}}], after_run=[NEXT, {"prompt": {"text": "look"}}])
+    assert [get_step_kind(step) for step in steps] == ["rest", "run", "next_stroke", "prompt"] * 4
+
+
+def test_a_repetition_without_a_step_repeats_the_run_of_its_cell_in_its_place():
+    steps = expand_matrix(after_run=[CELL_REPEAT, NEXT])
+    assert [get_step_kind(step) for step in steps] == ["repeat", "next_stroke"] * 4
+    repeats = steps[::2]
+    assert [(find_run(one).specimen, find_run(one).drive) for one in repeats] == [
+        ("A", 0.1), ("A", 0.2), ("B", 0.1), ("B", 0.2),
+    ]  # fmt: skip
+    assert {(one.repeat.at_most, one.repeat.until.parameter) for one in repeats} == {(4, "k0")}
+    document = campaign({"matrix": {"specimens": ["A"], "methods": ["quick"], "after_run": [CELL_REPEAT, NEXT]}})
+    assert plan_campaign(document, collect_methods(document)).methods[0].runs == 4
+
+
+def test_a_repetition_of_another_run_follows_that_of_the_cell():
+    other = {"repeat": {**CELL_REPEAT["repeat"], "step": RUN}}
+    steps = expand_matrix(after_run=[NEXT, other])
+    assert [get_step_kind(step) for step in steps[:3]] == ["run", "next_stroke", "repeat"]
+    assert find_run(steps[2]).specimen == "MR-1"
+
+
+@pytest.mark.parametrize("place", ["before_specimen", "before_run"])
+def test_a_proposed_stroke_before_the_first_run_of_a_matrix_is_refused(place):
+    with pytest.raises(CampaignError, match=r"step 1 of the matrix .* no run precedes it; put it into after_run"):
+        expand_matrix(**{place: [NEXT]})
+    assert expand_matrix(before_specimen=[RUN], before_run=[NEXT])
+
+
+def test_a_repetition_of_the_cell_that_is_not_first_is_refused_with_its_position():
+    with pytest.raises(CampaignError, match=r"steps\.matrix: a repeat without step must be the first"):
+        expand_matrix(after_run=[{"rest": {"seconds": 5}}, CELL_REPEAT])
+    with pytest.raises(CampaignError, match=r"steps\.matrix\.after_run\.0\.repeat\.at_most"):
+        expand_matrix(after_run=[{"repeat": {"until": {"diagnosis": "settled"}}}])
+
+
 def test_the_methods_of_runs_are_changed_as_asked():
     document = campaign([RUN, {"run": {"specimen": "MR-1", "method": "quick", "drive": 0.2}}])
     methods = collect_methods(document)

@@ -189,6 +189,28 @@ def test_proposed_strokes_are_added_until_the_diagnosis_is_settled():
     assert "settled after 2 proposed strokes" in bench.state.items[1].reason
 
 
+def test_proposed_strokes_of_a_cell_never_build_on_the_run_of_another_cell():
+    matrix = {"specimens": ["MR-1", "MR-2"], "methods": ["quick"], "after_run": [{"next_stroke": {"at_most": 2}}]}
+    bench = SimulatedBench(start({"matrix": matrix}, on_failure="skip"))
+    bench.results = {"run-0": result(1, 1, STROKE), "run-1": result(1, 1)}
+    bench.outcomes = {2: {"outcome": "incomplete", "ending": "tripped", "reason": "the rod is too fast"}}
+    assert bench.run().status == "done"
+    assert states(bench) == ["done", "done", "failed", "failed"]
+    assert bench.state.items[1].runs == ("run-1",)
+    assert "no complete run precedes it" in bench.state.items[3].reason
+    assert len(bench.logs) == 3
+
+
+def test_a_cell_is_repeated_to_its_goal_before_its_proposed_strokes():
+    goal = {"parameter": "k0", "ci_percent": 8}
+    after = [{"repeat": {"until": goal, "at_most": 5}}, {"next_stroke": {"at_most": 2}}]
+    bench = SimulatedBench(start({"matrix": {"specimens": ["MR-1"], "methods": ["quick"], "after_run": after}}))
+    bench.results = {"run-0": result(100, 10), "run-1": result(100, 10, STROKE), "run-2": result(100, 10)}
+    assert bench.run().status == "done"
+    assert [item.runs for item in bench.state.items] == [("run-0", "run-1"), ("run-2",)]
+    assert {fact.specimen for fact in bench.state.facts} == {"MR-1"}
+
+
 @pytest.mark.parametrize(
     ("condition", "reason"),
     [

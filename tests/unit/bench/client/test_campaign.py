@@ -3,6 +3,7 @@
 import pytest
 
 from bench.client import ClientError
+from bench.service.routes.planning import assessments
 
 REST = {"rest": {"seconds": 900}}
 PROMPT = {"prompt": {"text": "Mount the specimen", "note": True}}
@@ -17,6 +18,21 @@ def test_a_script_adds_a_photo_to_its_answer_and_downloads_it(bench, tmp_path):
     (tmp_path / "given.jpg").write_bytes(PHOTO)
     campaign.answer("12 N m", photo=tmp_path / "given.jpg")
     assert campaign.download_photo("s0001", tmp_path / "photo.jpg").read_bytes() == PHOTO
+
+
+def test_a_script_makes_the_dry_run_of_a_campaign(bench, monkeypatch):
+    design = {"messages": ["k0 to 3 %"]}
+    monkeypatch.setattr(
+        "bench.service.routes.planning.assessments.assess_design", lambda programme, command: design
+    )
+    assessments._assess.cache_clear()
+    document = {"name": "night", "steps": [REST, {"run": {"specimen": "MR-1", "method": "quick"}}]}
+    (quick,) = bench.plan_campaign(document, identifiability=False)["methods"]
+    assert quick["identifiability"] == []
+    plan = bench.plan_campaign(document)
+    assert plan["methods"][0]["identifiability"] == ["k0 to 3 %"]
+    assert plan["duration_s"] == pytest.approx(923.1)
+    assessments._assess.cache_clear()
 
 
 def test_a_script_starts_edits_answers_and_stops_a_campaign(bench, tmp_path):
@@ -37,7 +53,5 @@ def test_a_script_starts_edits_answers_and_stops_a_campaign(bench, tmp_path):
         campaign.download_report(tmp_path / "report.doc", "doc")
     assert [one["id"] for one in bench.list_campaigns()] == [campaign.id]
     assert bench.find_campaign() is None
-    assert bench.plan_campaign({"name": "night", "steps": [REST]})["duration_s"] == 900
-    assert bench.plan_campaign({"name": "night", "steps": [REST]}, identifiability=False)["methods"] == []
     with pytest.raises(ClientError, match="at least one step"):
         bench.start_campaign({"name": "night", "steps": []})

@@ -16,7 +16,7 @@ from bench.jobs.dask_task import TOPIC, make_cancel_flag, run_dask_task
 from bench.jobs.errors import JobCancelledError, JobError
 from bench.jobs.job_spec import JobSpec, ResultSummary
 from bench.jobs.progress import JobProgress
-from bench.jobs.scheduler import MAX_ATTEMPTS
+from bench.jobs.scheduler import HEARTBEAT_AGES, MAX_ATTEMPTS, describe_workers
 from bench.jobs.tls import SchedulerLocation
 
 _CONNECT_TIMEOUT = 10.0
@@ -144,7 +144,7 @@ class DaskEngine:
             raise JobError(f"job {job_id} has not stopped within {_RELEASE_TIMEOUT:g} s; try again later")
 
     async def describe_state(self) -> str:
-        """Return ``ok`` if a worker is connected, otherwise what is missing; asked for at most once a second."""
+        """Return ``ok`` if all workers answer, otherwise what is missing; asked for at most once a second."""
         if self._client is None:
             return f"no scheduler at {self._address}"
         async with self._asking:
@@ -155,10 +155,10 @@ class DaskEngine:
 
     async def _ask_for_workers(self, client: Any) -> str:
         try:
-            workers = await asyncio.wait_for(client.nthreads(), 1.0)
+            ages = await asyncio.wait_for(getattr(client.scheduler, HEARTBEAT_AGES)(), 1.0)
         except (TimeoutError, OSError, ValueError):
             return f"the scheduler at {self._address} does not reply"
-        return "ok" if workers else "no worker; start one: mrbench worker"
+        return describe_workers(ages)
 
     async def close(self) -> None:
         """Disconnect; the tasks continue on a scheduler that was not started here."""

@@ -3,11 +3,13 @@
 import asyncio
 import contextlib
 import signal
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import dask
-from distributed import Scheduler
+from distributed import Scheduler, SchedulerPlugin
+from distributed.metrics import time
 
 from bench.jobs.errors import WorkerError
 from bench.jobs.tls import LOOPBACK, SchedulerLocation, create_security
@@ -18,16 +20,35 @@ MAX_ATTEMPTS = 5
 A job whose memory is too large kills its worker each time. But starts also end by a power cut or a killed service,
 which are not the job's fault and cannot be told apart afterwards. So the number is larger than a crash needs.
 """
+HEARTBEAT_LIMIT = 6.0
+"""Age [s] of the last heartbeat above which a worker counts as silent.
+
+A worker sends a heartbeat each 0.5 s. The commands of a job are processes of their own, so they do not delay it.
+"""
+HEARTBEAT_AGES = "mrbench_heartbeat_ages"
+"""Name of the request that `measure_heartbeat_ages` answers."""
+WORKER_TTL = 30.0
+"""Age [s] of the last heartbeat above which the scheduler gives the job of a worker to another one.
+
+The scheduler compares once in this time, so a job moves after one to two of them. A job that is begun again
+loses its work, so the limit is several times the one at which the worker is only named.
+"""
 
 
 @contextlib.asynccontextmanager
-async def start_scheduler(data: Path, host: str = LOOPBACK, port: int = 0) -> AsyncIterator[SchedulerLocation]:
+async def start_scheduler(
+    data: Path,
+    host: str = LOOPBACK,
+    port: int = 0,
+    on_silent_worker: Callable[[int], None] | None = None,
+) -> AsyncIterator[SchedulerLocation]:
     """Run a scheduler with TLS, and write its address to the data folder meanwhile.
 
     Args:
         data: data folder; the credentials are created there unless they exist.
         host: address to listen on.
         port: port to listen on; 0 for any free one.
+        on_silent_worker: receives the process id of a worker that was removed after `WORKER_TTL`.
 
     Raises:
         WorkerError: it cannot listen.
@@ -39,6 +60,7 @@ async def start_scheduler(data: Path, host: str = LOOPBACK, port: int = 0) -> As
         "distributed.scheduler.http.routes": [],
         # Dask counts tolerated failures, not attempts.
         "distributed.scheduler.allowed-failures": MAX_ATTEMPTS - 1,
+        "distributed.scheduler.worker-ttl": f"{WORKER_TTL} s",
     }
     with dask.config.set(settings):
         # The scheduler opens a port for web pages in any case; port 0 avoids the well-known default.
@@ -46,6 +68,9 @@ async def start_scheduler(data: Path, host: str = LOOPBACK, port: int = 0) -> As
         scheduler = Scheduler(
             host=host, port=port, protocol="tls", security=security, dashboard_address=pages, dashboard=False
         )
+    scheduler.handlers[HEARTBEAT_AGES] = lambda: measure_heartbeat_ages(scheduler)
+    if on_silent_worker is not None:
+        scheduler.add_plugin(SilentWorkerReport(on_silent_worker))
     try:
         await scheduler
     except OSError as error:
@@ -57,6 +82,52 @@ async def start_scheduler(data: Path, host: str = LOOPBACK, port: int = 0) -> As
     finally:
         address_file.unlink(missing_ok=True)
         await scheduler.close()
+
+
+class SilentWorkerReport(SchedulerPlugin):
+    """Reports each worker that the scheduler removes because it is silent; one that leaves is not reported."""
+
+    def __init__(self, on_silent: Callable[[int], None]) -> None:
+        """Set the function that receives the process id of such a worker."""
+        self._on_silent = on_silent
+        self._pids: dict[str, int] = {}
+
+    def add_worker(self, scheduler: Any, worker: str) -> None:
+        """Keep the process id of a new worker: the scheduler forgets it before it reports the removal."""
+        self._pids[worker] = scheduler.workers[worker].pid
+
+    def remove_worker(self, scheduler: Any, worker: str, *, stimulus_id: str, **kwargs: Any) -> None:
+        """Report the worker if its time to live was the cause."""
+        pid = self._pids.pop(worker, None)
+        if pid is not None and stimulus_id.startswith("check-worker-ttl"):
+            self._on_silent(pid)
+
+
+def measure_heartbeat_ages(scheduler: Any) -> dict[str, float]:
+    """Return the time [s] since the last heartbeat of each worker, by its address.
+
+    The scheduler itself measures it, because its clock has stamped the heartbeats.
+    """
+    now = time()
+    return {worker.address: now - worker.last_seen for worker in scheduler.workers.values()}
+
+
+def describe_workers(ages: Mapping[str, float]) -> str:
+    """Return ``ok``, or what is missing to execute jobs.
+
+    Args:
+        ages: time since the last heartbeat of each worker [s], by its address.
+    """
+    silent = {address: age for address, age in ages.items() if age > HEARTBEAT_LIMIT}
+    if not ages:
+        return "no worker; start one: mrbench worker"
+    if not silent:
+        return "ok"
+    names = "the worker" if len(ages) == 1 else f"{len(silent)} of {len(ages)} workers ({', '.join(silent)})"
+    return (
+        f"no answer from {names} for {max(silent.values()):.0f} s, such as from a suspended process; "
+        f"its job is given to another worker within {2 * WORKER_TTL:.0f} s"
+    )
 
 
 def run_scheduler(data: Path, host: str, port: int, print_line: Callable[[str], None]) -> None:

@@ -28,15 +28,16 @@ _LOG = logging.getLogger(__name__)
 
 @contextlib.asynccontextmanager
 async def start_local_engine(data: Path, mrbench: Sequence[str] = MRBENCH_COMMAND) -> AsyncIterator[DaskEngine]:
-    """Start a scheduler in this process and one worker process, which is restarted whenever it ends.
+    """Start a scheduler in this process and one worker process, which is restarted whenever it ends or is silent.
 
     Args:
         data: data folder; it receives address and credentials of the scheduler, and the worker's output.
         mrbench: command that starts mrbench.
     """
-    async with start_scheduler(data) as location:
+    running: dict[int, subprocess.Popen[bytes]] = {}
+    async with start_scheduler(data, on_silent_worker=lambda pid: _kill_silent(running.get(pid))) as location:
         command = [*mrbench, "worker", "--scheduler", location.address, "--data", str(data)]
-        worker_task = asyncio.create_task(_keep_alive(command, data / "worker.log"))
+        worker_task = asyncio.create_task(_keep_alive(command, data / "worker.log", running))
         try:
             yield DaskEngine(location)
         finally:
@@ -51,17 +52,27 @@ async def connect_engine(location: SchedulerLocation) -> AsyncIterator[DaskEngin
     yield DaskEngine(location)
 
 
-async def _keep_alive(command: Sequence[str], log: Path) -> None:
+def _kill_silent(worker: "subprocess.Popen[bytes] | None") -> None:
+    """Kill a worker that does not answer, so that another one is started; SIGKILL ends a suspended process too."""
+    if worker is not None:
+        _LOG.warning("worker_silent", extra={"pid": worker.pid})
+        worker.kill()
+
+
+async def _keep_alive(command: Sequence[str], log: Path, running: "dict[int, subprocess.Popen[bytes]]") -> None:
+    """Start a worker again whenever it ends; `running` has the present one by its process id."""
     pause = 1.0
     while True:
         began = time.monotonic()
         process = await asyncio.to_thread(_start_process, command, log)
+        running[process.pid] = process
         _LOG.info("worker_started", extra={"pid": process.pid})
         try:
             status = await asyncio.to_thread(process.wait)
         finally:
             # After a cancellation, the waiting thread ends together with the process.
             await asyncio.shield(asyncio.to_thread(terminate, process, _TERMINATE_TIMEOUT))
+            del running[process.pid]
         _LOG.warning("worker_ended", extra={"pid": process.pid, "status": status, "log": str(log)})
         pause = 1.0 if time.monotonic() - began > MAX_RESTART_PAUSE else min(2.0 * pause, MAX_RESTART_PAUSE)
         await asyncio.sleep(pause)

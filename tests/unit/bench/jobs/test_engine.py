@@ -1,10 +1,13 @@
-"""Engine of jobs while the catalogue cannot be reached."""
+"""Engine of jobs while the catalogue cannot be reached, and the state of its workers."""
 
 import asyncio
 from types import SimpleNamespace
 
+import pytest
+
 from bench.catalogue import CatalogueUnavailableError
 from bench.jobs.engine import DaskEngine
+from bench.jobs.scheduler import HEARTBEAT_AGES
 from bench.jobs.tls import SchedulerLocation
 
 PROGRESS = {"stage": "refine", "fraction": 0.4, "activity": "identify: refine"}
@@ -50,3 +53,38 @@ def test_progress_that_cannot_be_recorded_is_left_out(caplog):
         asyncio.run(engine._on_event((0.0, {"job": "job", "progress": PROGRESS})))
     assert engine._listener.heard == ["job"]
     assert [record.message for record in caplog.records] == ["job_progress_not_recorded"]
+
+
+@pytest.mark.parametrize(
+    ("answer", "words"),
+    [
+        ({"tls://127.0.0.1:2": 0.4}, "ok"),
+        ({"tls://127.0.0.1:2": 40.0}, "no answer from the worker for 40 s"),
+        (TimeoutError(), "the scheduler at tls://127.0.0.1:1 does not reply"),
+    ],
+)
+def test_the_state_follows_the_heartbeats_of_the_workers(answer, words):
+    async def ask():
+        if isinstance(answer, Exception):
+            raise answer
+        return answer
+
+    engine = make_engine(0)
+    engine._client.scheduler = SimpleNamespace(**{HEARTBEAT_AGES: ask})
+    assert asyncio.run(engine.describe_state()).startswith(words)
+
+
+def test_the_scheduler_is_asked_once_a_second_at_most():
+    asked = []
+
+    async def ask():
+        asked.append(True)
+        return {"tls://127.0.0.1:2": 0.0}
+
+    async def ask_often():
+        return await asyncio.gather(*(engine.describe_state() for _ in range(5)))
+
+    engine = make_engine(0)
+    engine._client.scheduler = SimpleNamespace(**{HEARTBEAT_AGES: ask})
+    assert asyncio.run(ask_often()) == ["ok"] * 5
+    assert len(asked) == 1

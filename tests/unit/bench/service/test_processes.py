@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import errno
 import logging
+import signal
 import socket
 import sys
 
@@ -259,6 +260,15 @@ class TestProcesses:
     def test_a_silent_agent_is_reported(self):
         assert shut_down_idle_agent(FakeLink(silent=1)) == "the rig agent does not answer: no rig agent answered"
 
+    def test_a_suspended_worker_is_killed(self, tmp_path, caplog):
+        command = (sys.executable, "-c", "import time; time.sleep(600)")
+        worker = processes._start_process(command, tmp_path / "worker.log")
+        worker.send_signal(signal.SIGSTOP)
+        processes._kill_silent(worker)
+        assert worker.wait(60) == -signal.SIGKILL
+        processes._kill_silent(None)  # that of another machine
+        assert [record.message for record in caplog.records] == ["worker_silent"]
+
     def test_a_worker_that_ends_is_restarted(self, tmp_path, monkeypatch, caplog):
         caplog.set_level(logging.INFO, "bench.service.processes")
         begun = []
@@ -275,7 +285,8 @@ class TestProcesses:
         monkeypatch.setattr(processes, "_start_process", counted)
         monkeypatch.setattr(processes.asyncio, "sleep", skip_pause)
         with contextlib.suppress(asyncio.CancelledError):
-            asyncio.run(processes._keep_alive(make_failing_command("no scheduler", 3), tmp_path / "worker.log"))
+            command = make_failing_command("no scheduler", 3)
+            asyncio.run(processes._keep_alive(command, tmp_path / "worker.log", {}))
         assert len(begun) == 3
         assert (tmp_path / "worker.log").read_text().splitlines() == ["no scheduler"] * 3
         assert [record.status for record in caplog.records if record.message == "worker_ended"] == [3] * 3

@@ -14,7 +14,7 @@ import { EventList } from "./bench/events.js";
 import { byId, fixed, write } from "./common/format.js";
 import { HealthStrip } from "./bench/health.js";
 import { JobView } from "./jobs/jobs.js";
-import { greyInstruments, showInstruments, showWarnings } from "./bench/instruments.js";
+import { forgetInstruments, forgetWarnings, showInstruments, showWarnings } from "./bench/instruments.js";
 import { Limits } from "./live/limits.js";
 import { LiveLink, fillCoilChannel } from "./live/live.js";
 import { PlanView } from "./plan/plan.js";
@@ -71,11 +71,11 @@ const bar = new TopBar({
   clock,
   onState: (state) => {
     form.show({ state });
-    if (state === "unknown") greyInstruments();
+    if (state === "unknown") forgetStatus();
   },
 });
 const benches = new BenchList({ onProblem: (text) => bar.showDetail(text, true) });
-const preparation = new Preparation();
+const preparation = new Preparation({ onStatus: (status) => HANDLERS.status(status) });
 const health = new HealthStrip();
 const events = new EventList();
 const plan = new PlanView();
@@ -150,9 +150,10 @@ const HANDLERS = {
       QUANTITIES.drive.unit = status.drive_unit;
       plots.relabel();
     }
-    if (!bar.stale) showInstruments(status.instruments);
-    showWarnings(status.warnings);
     form.showDrive(status.drive_kind);
+    if (bar.stale) return; // a status is true at its own time only
+    showInstruments(status.instruments);
+    showWarnings(status.warnings);
     health.showStatus(status);
     preparation.update(status);
   },
@@ -183,6 +184,14 @@ function addBatch(batch) {
   clock.update(batch.utc + (batch.count - 1) * batch.period);
   if (ring.written) playhead.observe(ring.origin + ring.latest);
   ring.push(fillCoilChannel(batch, driveKind));
+}
+
+/** Shows as not known what comes with a status alone, until the next one arrives. */
+function forgetStatus() {
+  forgetInstruments();
+  forgetWarnings();
+  health.forget();
+  preparation.forget();
 }
 
 /** Requests the agent's status by REST: its error explains why no live messages arrive. */

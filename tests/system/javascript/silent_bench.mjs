@@ -23,14 +23,24 @@ const look = () =>
   page.evaluate(() => ({
     line: document.getElementById("bar-line").innerText,
     marks: [...document.querySelectorAll("#instruments .mark")].map((mark) => [mark.className, mark.innerText]),
+    numbers: [...document.querySelectorAll("#instruments tr")].map((row) => [2, 7].map((place) => row.children[place].innerText)),
+    warnings: [...document.querySelectorAll("#warnings li")].map((one) => one.innerText),
     startDisabled: document.getElementById("start").disabled,
     liveAge: document.getElementById("live-age").innerText,
+    segment: document.getElementById("segment").innerText,
+    reference: document.getElementById("reference-state").innerText,
+    steps: document.querySelectorAll("#prepare .done, #prepare [aria-current]").length,
+    enabled: document.querySelectorAll("#prepare button:enabled").length,
+    health: Object.fromEntries([...document.querySelectorAll("#health li")].map((one) => [
+      one.firstChild.innerText, `${one.firstChild.className}: ${one.lastChild.textContent.trim()}`])),
   }));
 
 await page.goto(`${url}/#token=${token}`);
 await page.waitForFunction(() => document.getElementById("state-word").innerText === "Idle");
 // On a busy machine the first status may come long before the first samples.
 await page.waitForFunction(() => document.getElementById("live-age").innerText.startsWith("newest sample"));
+await page.waitForFunction(() => document.getElementById("health").innerText.includes("Agent ready"));
+seen.before = await look();
 await watch();
 await fetch(`${url}/api/v1/silence`, { method: "POST", headers: { Authorization: `Bearer ${token}` } });
 await page.waitForTimeout(9_000); // longer than a silence after which the websocket was opened again

@@ -3,6 +3,8 @@
 import { byId, element, fixed, shortTime, write } from "../common/format.js";
 
 const rows = new Map();
+/** Columns whose values are true at the time of a status only; the others are counts. */
+const [AGE_COLUMN, CLOCK_COLUMN] = [2, 7];
 
 /** Updates the table; rows keep their places, and only changed cells are written. */
 export function showInstruments(instruments) {
@@ -24,12 +26,13 @@ export function showInstruments(instruments) {
 }
 
 /** Shows that nothing is known about the instruments at present. */
-export function greyInstruments() {
+export function forgetInstruments() {
   for (const row of rows.values()) {
     const [mark, message] = row.children[1].children;
     mark.className = "mark";
     write(mark, "no data");
     write(message, "");
+    for (const place of [AGE_COLUMN, CLOCK_COLUMN]) write(row.children[place], "–");
   }
 }
 
@@ -64,4 +67,12 @@ export function showWarnings(warnings) {
   if (list.dataset.shown === JSON.stringify(warnings)) return;
   list.dataset.shown = JSON.stringify(warnings);
   list.replaceChildren(...warnings.map((text) => element("li", {}, text)));
+}
+
+/** Shows that the present warnings are not known; before the first status the list stays empty. */
+export function forgetWarnings() {
+  const list = byId("warnings");
+  if (!list.dataset.shown) return;
+  delete list.dataset.shown;
+  list.replaceChildren(element("li", {}, "No data: the warnings are not known."));
 }

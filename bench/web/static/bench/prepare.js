@@ -16,7 +16,12 @@ const REFERENCE_STATES = {
 };
 
 export class Preparation {
-  constructor() {
+  /** Takes a function that receives the status after a step. */
+  constructor({ onStatus }) {
+    this.onStatus = onStatus;
+    this.reference = "";
+    this.message = "";
+    this.isArranged = false;
     for (const button of byId("prepare").querySelectorAll("button")) {
       button.addEventListener("click", () => this.ask(button.dataset.step));
     }
@@ -30,18 +35,36 @@ export class Preparation {
     if (reference !== this.reference) this.mark(reference);
     if (step && JSON.stringify(step) !== this.shown) {
       this.shown = JSON.stringify(step);
+      this.message = step.message;
       write(byId("prepare-note"), step.message);
     }
-    for (const button of byId("prepare").querySelectorAll("button")) button.disabled = state !== "idle";
+    this.enable(state === "idle");
   }
 
-  /** Marks the steps that are done, and the next one; opens the steps while the rod's position is not known. */
+  /** Shows that nothing is known: no step counts as done, and none can be requested. Other notes stay. */
+  forget() {
+    write(byId("reference-state"), "not known");
+    this.mark("");
+    this.enable(false);
+    if (byId("prepare-note").textContent !== this.message) return;
+    write(byId("prepare-note"), "");
+    this.shown = "";
+  }
+
+  enable(isPossible) {
+    for (const button of byId("prepare").querySelectorAll("button")) button.disabled = !isPossible;
+  }
+
+  /** Marks the steps that are done, and the next one; opens the steps once if the rod's position is not known. */
   mark(reference) {
-    if (!this.reference) byId("preparation").open = ["unreferenced", "reference_lost"].includes(reference);
+    if (reference && !this.isArranged) {
+      this.isArranged = true;
+      byId("preparation").open = ["unreferenced", "reference_lost"].includes(reference);
+    }
     this.reference = reference;
     const steps = [...byId("prepare").querySelectorAll("li[data-done-in]")];
     const isDone = (step) => step.dataset.doneIn.split(" ").includes(reference);
-    const next = steps.find((step) => !isDone(step));
+    const next = reference ? steps.find((step) => !isDone(step)) : null;
     for (const step of steps) {
       step.classList.toggle("done", isDone(step));
       if (step === next) step.setAttribute("aria-current", "step");
@@ -61,7 +84,7 @@ export class Preparation {
   async execute(step) {
     try {
       const position = step === "move" ? byId("move-to").valueAsNumber / QUANTITIES.displacement.scale : 0;
-      this.update(await start(benchPath("/prepare"), { step, position_m: position }));
+      this.onStatus(await start(benchPath("/prepare"), { step, position_m: position }));
     } catch (problem) {
       write(byId("prepare-note"), problem.after("Nothing was done"));
     }

@@ -118,7 +118,7 @@ export class TopBar {
     const run = MOVING.includes(state) ? this.run : null;
     const bar = byId("progress");
     bar.value = run ? Math.min(1, run.elapsed_s / run.duration_s) : 0;
-    write(byId("segment"), run ? describeSegment(run) : "No run");
+    write(byId("segment"), run ? describeSegment(run) : state === "unknown" ? "Run not known" : "No run");
     const left = run && `${duration(run.duration_s - run.elapsed_s)} left of ${duration(run.duration_s)}`;
     write(byId("time-left"), left ?? "");
   }

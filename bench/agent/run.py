@@ -149,8 +149,14 @@ class Run:
             calibration_overdue=request.overdue,
             failed_checks=request.failed_checks,
             pause="" if is_over else self._describe_pause(elapsed),
+            paused_after=self.sequencer.paused_after if is_over and self._is_paused else "",
             lost=self._lost if is_over else self._recording_thread.count_lost(),
         )
+
+    @property
+    def _is_paused(self) -> bool:
+        """True if a pause ended the run: neither a stop nor a trip did."""
+        return self._ending == "stopped" and not self.sequencer.stop_reason
 
     def _describe_pause(self, elapsed: float) -> str:
         """Return when a requested pause takes effect, from the completed time of the plan [s]."""

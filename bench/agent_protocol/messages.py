@@ -59,6 +59,9 @@ class RunStatus(Message):
     pause: str = Field(
         default="", description="when a requested pause takes effect, for a person; empty without a request"
     )
+    paused_after: str = Field(
+        default="", description="checkpoint at which a pause ended the run, so that it can be resumed; or empty"
+    )
     lost: dict[str, int] = Field(default_factory=dict, description="number of lost samples by channel")
 
 

@@ -51,6 +51,7 @@ CHANNELS = (
     Channel("temperature", "degC"),
 )
 PAUSE = "at checkpoint 10mm_1Hz, in 4 s"
+CHECKPOINT = "10mm_1Hz"
 WAITING = "waiting for bench left, which this service does not have: 1"
 OVERDUE = "coil_voltage: calibration overdue since 2025-02-20 (certificate E-77 of Testo Industrial Services)"
 TRIP = "load cell: force 1 523.4 N exceeds the specimen's limit of 1 500 N; lower the stroke or the drive"
@@ -475,7 +476,10 @@ def run_routes(bench: FakeBench) -> APIRouter:
 
 
 def run_control_routes(bench: FakeBench) -> APIRouter:
-    """Create the routes that pause, resume and check a run, and repeat or cancel a job."""
+    """Create the routes that pause, resume and check a run, and repeat or cancel a job.
+
+    ``checkpoint`` exists for tests and ends the run as a pause does.
+    """
     router = APIRouter()
 
     @router.post("/runs/{run_id}/pause")
@@ -483,6 +487,11 @@ def run_control_routes(bench: FakeBench) -> APIRouter:
         assert bench.run is not None
         bench.run["pause"] = PAUSE
         return bench.status()
+
+    @router.post("/checkpoint")
+    async def reach_checkpoint() -> Any:
+        ended = {"outcome": "incomplete", "ending": "stopped", "reason": f"paused at checkpoint {CHECKPOINT}"}
+        bench.state, bench.run = "idle", (bench.run or {}) | ended | {"pause": "", "paused_after": CHECKPOINT}
 
     @router.post("/runs/{run_id}/resume", status_code=201)
     async def resume(run_id: str) -> Any:

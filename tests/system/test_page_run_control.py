@@ -5,7 +5,7 @@ import re
 
 import pytest
 
-from tests.support.fake_page_service import HASH, PAUSE, FakeBench
+from tests.support.fake_page_service import CHECKPOINT, HASH, PAUSE, FakeBench
 from tests.support.page_in_browser import browser_test, operate_page
 
 
@@ -33,10 +33,21 @@ def test_a_requested_pause_says_when_it_takes_effect(seen):
 
 
 @browser_test
+def test_a_paused_run_can_be_resumed_beside_start(seen):
+    assert seen["paused"] == f"The last run was paused after {CHECKPOINT}; Resume continues it."
+    start, resume = seen["places"]
+    assert start == resume
+    assert resume[1] >= 44
+    assert seen["focused"] == "stop"
+    assert [seen["resumeWhileRunning"], seen["resumeAfterwards"]] == [False, False]
+
+
+@browser_test
 def test_the_buttons_call_the_service(seen, bench):
     paths = [path for path, _ in bench.posted]
     wanted = [
         "runs/run-4/pause",
+        "runs/run-4/resume",
         "bench/abort",
         "jobs/job-run-3/retry",
         "runs/run-3/integrity",

@@ -151,6 +151,7 @@ const HANDLERS = {
       plots.relabel();
     }
     form.showDrive(status.drive_kind);
+    form.showLastRun(status.run);
     if (bar.stale) return; // a status is true at its own time only
     showInstruments(status.instruments);
     showWarnings(status.warnings);

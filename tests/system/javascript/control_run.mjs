@@ -36,6 +36,19 @@ try {
   await shows("bar-line", "Pause: ");
   seen.pause = await page.locator("#bar-line").innerText();
   seen.pauseDisabled = await page.locator("#pause").isDisabled();
+  seen.resumeWhileRunning = await page.locator("#resume").isVisible();
+  await post("checkpoint");
+  await hasState("Idle");
+  await shows("start-note", "Resume continues it");
+  seen.paused = await page.locator("#start-note").innerText();
+  seen.places = await page.locator("#start, #resume").evaluateAll((all) => all.map((one) => {
+    const { y, height } = one.getBoundingClientRect();
+    return [y, height];
+  }));
+  await page.click("#resume");
+  await hasState("Running");
+  seen.focused = await page.evaluate(() => document.activeElement.id);
+  seen.resumeAfterwards = await page.locator("#resume").isVisible();
   await page.click("#abort");
   await hasState("Tripped");
   seen.buttons.tripped = await visible();
@@ -56,7 +69,7 @@ try {
   await page.click("button:has-text('Check log')");
   await shows("run", "The log is changed");
   seen.facts = await page.locator("#run").innerText();
-  await page.click("button:has-text('Resume')");
+  await page.click("#run button:has-text('Resume')");
   await hasState("Running");
   seen.address = new URL(page.url()).hash;
 

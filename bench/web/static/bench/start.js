@@ -1,9 +1,10 @@
-// Form that starts a run: method, specimen and operator.
+// Form that starts a run: method, specimen and operator; Resume beside it after a pause.
 
 import { get, start } from "../common/api.js";
 import { benchQuery, withBench } from "../common/bench.js";
 import { byId, describeDriveKind, duration, element, write } from "../common/format.js";
 import { followOperator, keepOperatorName } from "../common/session.js";
+import { requestResumption } from "../runs/run_actions.js";
 
 /** Reason why no run can be started, by state of the bench; empty if one can. */
 const OBSTACLES = {
@@ -22,6 +23,8 @@ export class StartForm {
     this.problem = "";
     this.busy = false;
     this.state = "unknown";
+    this.paused = null;
+    byId("resume").addEventListener("click", () => this.resume());
     followOperator(byId("operator"));
     byId("start-form").addEventListener("submit", (event) => {
       event.preventDefault();
@@ -47,6 +50,12 @@ export class StartForm {
     if (!kind || kind === this.driveKind) return;
     this.driveKind = kind;
     this.list(this.method());
+  }
+
+  /** Shows the latest run of the bench, which can be resumed if a pause ended it. */
+  showLastRun(run) {
+    this.paused = run?.paused_after ? run : null;
+    this.show({});
   }
 
   /** Lists the methods; those for another drive are named apart, because this bench cannot run them. */
@@ -82,22 +91,36 @@ export class StartForm {
     this.problem = state === this.state ? problem : "";
     this.state = state;
     const obstacle = OBSTACLES[state] ?? "";
-    byId("start").disabled = this.busy || obstacle !== "";
-    write(byId("start-note"), this.problem || obstacle);
+    byId("start").disabled = byId("resume").disabled = this.busy || obstacle !== "";
+    byId("resume").hidden = !this.paused;
+    const pause = this.paused ? `The last run was paused after ${this.paused.paused_after}; Resume continues it.` : "";
+    write(byId("start-note"), this.problem || obstacle || pause);
     byId("start-note").classList.toggle("problem", this.problem !== "");
   }
 
-  async start() {
+  start() {
     const [method, specimen, operator] = [this.method(), byId("specimen").value.trim(), byId("operator").value.trim()];
     if (!method) return this.show({ problem: "Choose a method." });
+    this.attempt("Not started", async () => {
+      const run = await start("runs", withBench({ method, specimen, operator })); // returns once the run has started
+      keepOperatorName(operator);
+      return run;
+    });
+  }
+
+  resume() {
+    const { id } = this.paused;
+    this.attempt("Not resumed", () => requestResumption(id));
+  }
+
+  /** Makes a request that returns a started run; the reason of its refusal is shown beside the buttons. */
+  async attempt(consequence, request) {
     this.busy = true;
     this.show({ problem: "" });
     try {
-      const run = await start("runs", withBench({ method, specimen, operator })); // returns once the run has started
-      keepOperatorName(operator);
-      this.onStarted(run);
+      this.onStarted(await request());
     } catch (problem) {
-      this.problem = problem.after("Not started");
+      this.problem = problem.after(consequence);
     } finally {
       this.busy = false;
       this.show({});

@@ -135,7 +135,7 @@ export class RunActions {
 
   resume(run) {
     return this.attempt(run, "Not resumed", async () => {
-      const next = await start(`runs/${encode(run.id)}/resume`);
+      const next = await requestResumption(run.id);
       this.onRun(next);
       location.hash = next.bench && shownBench() ? addressOf(next.bench, "#/bench") : "#/bench";
       return "The run was resumed; the new run continues it.";
@@ -186,5 +186,8 @@ export class RunActions {
     }
   }
 }
+
+/** Requests the run that continues another one after its last checkpoint; returns it once it has started. */
+export const requestResumption = (id) => start(`runs/${encode(id)}/resume`);
 
 const name = (run) => `run of ${instant(run.started)}`;

@@ -132,6 +132,14 @@ def test_paused_run_is_stopped_at_its_checkpoint(run):
     status = execute(run)
     assert (status.outcome, status.ending) == ("incomplete", "stopped")
     assert (status.reason, status.pause) == ("paused at checkpoint 10mm_1Hz_0.2V", "")
+    assert status.paused_after == "10mm_1Hz_0.2V"
+
+
+def test_only_a_run_that_a_pause_ended_names_its_checkpoint(run):
+    run.pause()
+    assert run.get_status().paused_after == ""
+    run.stop("stopped on request", False, "stopped")
+    assert execute(run).paused_after == ""
 
 
 def test_pause_without_a_later_checkpoint_takes_effect_after_the_run(run):

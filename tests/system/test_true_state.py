@@ -1,5 +1,6 @@
-"""State that the page shows while agent and service are suspended or killed, with all processes of a bench."""
+"""State that the page shows while agent, service, worker or simulated rig is suspended or killed."""
 
+import contextlib
 import json
 import os
 import re
@@ -27,6 +28,7 @@ HOLD = 9.0
 
 
 def wait_for(condition, message):
+    """Return what a condition returns as soon as it holds."""
     end = time.monotonic() + DEADLINE
     while not (found := condition()):
         assert time.monotonic() < end, message()
@@ -35,30 +37,33 @@ def wait_for(condition, message):
 
 
 class Page:
-    """Page in a browser, and the states that it has shown."""
+    """Page in a browser, and what it has shown: lines of `watch_state.mjs`."""
 
     def __init__(self, address):
         command = [NODE, str(FOLDER / "watch_state.mjs"), address, CHROMIUM]
         self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-        self.words, self.times = [], []
+        self.lines = []
         self._reader = threading.Thread(target=self._read)
         self._reader.start()
 
     def _read(self):
         for line in self.process.stdout:
-            change = json.loads(line)
-            self.times.append(change["utc_s"])
-            self.words.append(change["word"])
+            self.lines.append(json.loads(line))
 
-    def wait_for(self, word):
-        wait_for(lambda: self.words[-1:] == [word], lambda: f"{word} did not come after {self.words}")
+    def wait_for(self, condition):
+        """Wait until the line shown last fulfils a condition, and return it."""
+        wait_for(lambda: self.lines and condition(self.lines[-1]), lambda: f"did not come: {self.lines[-5:]}")
+        return self.lines[-1]
 
-    def list_words_after(self, start):
-        """Return the states shown since a time [s, UTC].
+    def wait_for_word(self, word):
+        self.wait_for(lambda line: line["word"] == word)
+
+    def list_after(self, start):
+        """Return the lines since a time [s, UTC].
 
         On a busy machine, a status from before the end of a process may arrive late. Until it is old, it is true.
         """
-        return [word for at, word in zip(self.times, self.words, strict=False) if at > start]
+        return [line for line in self.lines if line["utc_s"] > start]
 
     def close(self):
         self.process.stdin.close()
@@ -67,33 +72,91 @@ class Page:
         self.process.stdout.close()
 
 
+def shows_status(line):
+    """Return whether the page shows anything that only a status of the agent can say."""
+    health = line["health"]
+    known = [health.get(name) not in (None, "not known") for name in ("Wires", "Clocks")]
+    return line["word"] != "No connection" or any(known) or line["done"] > 0 or line["enabled"] > 0
+
+
+def shows_wires(line):
+    """Return whether the page shows a run, or instruments that all answer.
+
+    After its wire was lost, the amplifier keeps the fault that its zero output was not confirmed.
+    """
+    return line["word"] == "Running" or line["health"].get("Wires") in ("ready", "fault of coil_amplifier")
+
+
+def shows_worker(line):
+    """Return whether the page shows a worker that answers."""
+    return line["health"].get("Worker") == "ready"
+
+
+SIGNS = {"agent": shows_status, "service": shows_status, "wire": shows_wires, "worker": shows_worker}
+"""Signs that the page must not show while a process is suspended or killed."""
+
+
 def start(words, folder, name):
     with (folder / f"{name}.log").open("w") as log:
         return subprocess.Popen([*MRBENCH, *words], cwd=folder, stdout=log, stderr=log, env=ENVIRONMENT)
 
 
+class RunningBench:
+    """Processes of a bench by name, the page and a client."""
+
+    def __init__(self, folder):
+        self.folder, self.processes = folder, {}
+        self.page = self.client = self.url = self.token = None
+
+    def start(self):
+        self.processes["wire"] = start(["sim", "--out", "bench.toml"], self.folder, "sim")
+        wait_for((self.folder / "bench.toml").is_file, (self.folder / "sim.log").read_text)
+        self.start_agent()
+        words = ["serve", "--config", "bench.toml", "--port", "0", "--data", "runs"]
+        self.processes["service"] = start(words, self.folder, "service")
+        found = wait_for(lambda: find_address(self.folder), (self.folder / "service.log").read_text)
+        self.url, self.token = found
+        self.client, self.page = Bench(*found), Page(f"{self.url}/#token={self.token}")
+
+    def start_agent(self):
+        log = self.folder / "agent.log"
+        log.unlink(missing_ok=True)
+        self.processes["agent"] = start(["rig", "--config", "bench.toml"], self.folder, "agent")
+        wait_for(lambda: "commands" in log.read_text(), log.read_text)
+
+    def find(self, name):
+        """Return a process; the worker is the one that the service has started last."""
+        if name != "worker":
+            return psutil.Process(self.processes[name].pid)
+        return psutil.Process(self.find_started(name)[-1])
+
+    def find_started(self, name):
+        """Return the ids of the processes that the service has started, such as workers."""
+        log = (self.folder / "service.log").read_text()
+        return [int(number) for number in re.findall(rf"{name}_started pid=(\d+)", log)]
+
+    def end(self):
+        if self.page is not None:
+            self.page.close()
+        for name in ("service", "agent", "wire"):
+            if process := self.processes.get(name):
+                process.send_signal(signal.SIGCONT)
+                process.send_signal(signal.SIGINT)
+                process.wait(60)
+        for number in self.find_started("agent"):
+            with contextlib.suppress(psutil.NoSuchProcess):
+                psutil.Process(number).kill()
+
+
 @pytest.fixture(scope="module")
 def bench(tmp_path_factory):
     """Start the simulated rig, an agent and a service, and open the page."""
-    folder = tmp_path_factory.mktemp("bench")
-    processes, page = [start(["sim", "--out", "bench.toml"], folder, "sim")], None
+    bench = RunningBench(tmp_path_factory.mktemp("bench"))
     try:
-        wait_for((folder / "bench.toml").is_file, (folder / "sim.log").read_text)
-        processes.append(start(["rig", "--config", "bench.toml"], folder, "agent"))
-        wait_for(lambda: "commands" in (folder / "agent.log").read_text(), (folder / "agent.log").read_text)
-        words = ["serve", "--config", "bench.toml", "--port", "0", "--data", "runs"]
-        processes.append(start(words, folder, "service"))
-        url, token = wait_for(lambda: find_address(folder), (folder / "service.log").read_text)
-        page = Page(f"{url}/#token={token}")
-        yield processes[1], processes[2], page, Bench(url, token)
+        bench.start()
+        yield bench
     finally:
-        if page is not None:
-            page.close()
-        for process in reversed(processes):
-            process.send_signal(signal.SIGCONT)
-            process.send_signal(signal.SIGINT)
-        for process in reversed(processes):
-            process.wait(60)
+        bench.end()
 
 
 def find_address(folder):
@@ -106,34 +169,50 @@ def find_address(folder):
     return (printed[1], token) if token else None
 
 
-@browser_test
-@pytest.mark.timeout(400)
-@pytest.mark.parametrize("which", [0, 1], ids=["agent", "service"])
-def test_a_suspended_process_is_never_shown_as_alive(bench, which):
-    process, page = bench[which], bench[2]
-    page.wait_for("Idle")
+@contextlib.contextmanager
+def suspended(process):
     process.send_signal(signal.SIGSTOP)
-    stopped = time.time()
     try:
-        page.wait_for("No connection")
-        time.sleep(HOLD)
-        assert "Idle" not in page.list_words_after(stopped + STATUS_AGE)
-        assert page.words[-1] == "No connection"
+        yield time.time()
     finally:
         process.send_signal(signal.SIGCONT)
-    page.wait_for("Idle")
+
+
+def start_run(bench):
+    bench.page.wait_for_word("Idle")
+    bench.client.start(LONG_METHOD, "MR-0042")
+    bench.page.wait_for_word("Running")
+
+
+def check_absence(page, sign):
+    """Check that the page stops to show a sign, and does not show it again."""
+    page.wait_for(lambda line: not sign(line))
+    noticed = time.time()
+    time.sleep(HOLD)
+    assert not any(map(sign, page.list_after(noticed)))
+    assert not sign(page.lines[-1])
+
+
+@browser_test
+@pytest.mark.timeout(400)
+@pytest.mark.parametrize("name", ["agent", "service", "worker", "wire"])
+def test_a_suspended_process_is_never_shown_as_alive(bench, name):
+    page, sign = bench.page, SIGNS[name]
+    page.wait_for(lambda line: line["word"] == "Idle" and shows_wires(line) and shows_worker(line))
+    with suspended(bench.find(name)) as stopped:
+        check_absence(page, sign)
+        if sign is shows_status:
+            assert not any(map(sign, page.list_after(stopped + STATUS_AGE)))
+    page.wait_for(lambda line: line["word"] != "No connection" and sign(line))
 
 
 @browser_test
 @pytest.mark.timeout(400)
 def test_an_agent_killed_during_a_run_is_never_shown_as_running_again(bench):
-    agent, _, page, client = bench
-    page.wait_for("Idle")
-    client.start(LONG_METHOD, "MR-0042")
-    page.wait_for("Running")
-    psutil.Process(agent.pid).kill()
-    agent.wait(30)
+    start_run(bench)
+    bench.find("agent").kill()
+    bench.processes["agent"].wait(30)
     killed = time.time()
-    page.wait_for("No connection")
+    bench.page.wait_for(lambda line: not shows_status(line))
     time.sleep(HOLD)
-    assert "Running" not in page.list_words_after(killed + STATUS_AGE)
+    assert "Running" not in [line["word"] for line in bench.page.list_after(killed + STATUS_AGE)]

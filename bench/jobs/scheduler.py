@@ -23,8 +23,8 @@ which are not the job's fault and cannot be told apart afterwards. So the number
 HEARTBEAT_LIMIT = 6.0
 """Age [s] of the last heartbeat above which a worker counts as silent.
 
-A worker sends a heartbeat each 0.5 s. The commands of a job are processes of their own, so they do not delay it. Its
-own thread reads a log and holds the interpreter for parts of a second. The largest age measured was 1.9 s, at
+A worker sends a heartbeat each 0.5 s. The commands of a job are processes of their own, so they do not delay it.
+Its own thread reads a log and holds the interpreter for parts of a second. The largest age measured was 1.9 s, at
 niceness 19 and with seven busy processes for each core.
 """
 HEARTBEAT_AGES = "mrbench_heartbeat_ages"

@@ -12,8 +12,8 @@ from datetime import UTC, datetime, timedelta
 from typing import Any
 
 from bench.campaigns.delivery import RECIPIENT, TIMEOUT, deliver
-from bench.campaigns.document import CampaignError, Recipient
-from bench.campaigns.store import CampaignStore, StoredCampaign
+from bench.campaigns.document import Campaign, CampaignError, Recipient
+from bench.campaigns.store import CampaignStore
 from bench.catalogue import ClaimedNotification
 from bench.log_lines import RepeatedFailure
 from bench.threads import BackgroundThread
@@ -95,13 +95,14 @@ def _make_content(store: CampaignStore, claimed: ClaimedNotification) -> dict[st
     }
 
 
-def send_test(campaign: StoredCampaign) -> str:
+def send_test(document: Campaign) -> str:
     """Send a test message to the recipients of a campaign; return `sent`, or the reasons of failures.
+
+    The campaign need not have started.
 
     Raises:
         CampaignError: it has no recipients.
     """
-    document = campaign.state.campaign
     if not document.notify:
         raise CampaignError(f"campaign {document.name} has no recipients; give it notify")
     return send_all(document.notify, make_test_content(document.name))

@@ -177,6 +177,21 @@ class Bench(Calibration):
         request = {"campaign": campaign, **quick, **self._choice}
         return dict(self._session.post("/campaigns/plan", request, timeout=_ASSESSMENT_TIMEOUT))
 
+    def send_test_message(self, campaign: Mapping[str, Any]) -> str:
+        """Send a test message to the recipients of a campaign that is not started.
+
+        Args:
+            campaign: document `mrbench.campaign/1`.
+
+        Returns:
+            `sent`, or the reasons of failures.
+
+        Raises:
+            ClientError: the campaign is invalid or has no recipients, or the service cannot be reached.
+        """
+        request = {"campaign": campaign}
+        return str(self._session.post("/campaigns/test-message", request, key=uuid.uuid4().hex)["result"])
+
     def find_campaign(self) -> Campaign | None:
         """Return the campaign that holds the bench, or None.
 

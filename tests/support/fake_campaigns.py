@@ -201,6 +201,11 @@ def campaign_routes(campaigns: FakeCampaigns) -> APIRouter:
         except CampaignError as error:
             return refuse(error)
 
+    @router.post("/test-message")
+    async def try_recipients(wanted: PlanCampaignRequest) -> Any:
+        notify = parse_campaign(wanted.campaign, "the request").notify
+        return TestMessageResult(result="sent") if notify else refuse(CampaignError("it has no recipients"))
+
     @router.post("", status_code=201)
     async def start(wanted: StartCampaignRequest) -> Any:
         if wanted.campaign.get("methods") == "approved":

@@ -160,6 +160,7 @@ def test_pause_resume_and_stop_are_confirmed_and_sent(seen):
 def test_a_campaign_is_started_after_its_dry_run(seen):
     assert "a campaign needs at least one step" in seen["refusedPlan"]
     assert not seen["startsWithoutPlan"]
+    assert seen["startsAfterTest"]
     for part in ("Expected time", "kJ", "the disk has 42 GB free", "within limits", "2. rest 600 s", "k0 to 3 %"):
         assert part in seen["plan"]
     assert seen["begun"] == ["#/campaigns/morning-1", "stop"]

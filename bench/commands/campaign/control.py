@@ -15,6 +15,7 @@ from bench.campaigns import (
     StoredCampaign,
     answer,
     format_view,
+    load_campaign,
     make_view,
     parse_choice,
     parse_edit,
@@ -64,7 +65,7 @@ def control(
     with open_store(data) as store:
         campaign = _find(store, target)
         if action == "test-message":
-            typer.echo(send_test(campaign))
+            typer.echo(send_test(campaign.state.campaign))
             return
         now = campaign.read_time()
         before = campaign.state.status
@@ -82,6 +83,15 @@ def control(
         typer.echo(view.model_dump_json(indent=2) if as_json else "\n".join(format_view(view)))
         if action == "stop":
             send_due(store)  # without a service nobody else would send them
+
+
+def send_test_of_file(path: Path) -> None:
+    """Send a test message to the recipients in the file of a campaign, which need not have started.
+
+    Raises:
+        BenchError: the file is no campaign, or has no recipients.
+    """
+    typer.echo(send_test(load_campaign(path)))
 
 
 def _make_change(

@@ -31,7 +31,11 @@ def campaign(
         ),
     ],
     target: Annotated[
-        str, typer.Argument(help="File of the campaign for plan and run, else its id.", metavar="FILE|ID")
+        str,
+        typer.Argument(
+            help="File of the campaign for plan and run, its file or id for test-message, else its id.",
+            metavar="FILE|ID",
+        ),
     ] = "",
     config: Annotated[
         Path | None,
@@ -98,6 +102,10 @@ def campaign(
         from bench.commands.campaign.report import report
 
         report(target, data, out)
+    elif action is Action.TEST_MESSAGE and (target.endswith(".json") or Path(target).is_file()):
+        from bench.commands.campaign.control import send_test_of_file
+
+        send_test_of_file(Path(target))
     else:
         from bench.commands.campaign.control import control
 

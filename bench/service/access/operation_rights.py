@@ -78,6 +78,7 @@ OPERATION_RIGHTS: Mapping[str, Right] = {
     "POST /specimens/{serial:path}/trend": "analyse",
     "POST /campaigns": "operate",
     "POST /campaigns/plan": "view",
+    "POST /campaigns/test-message": "operate",
     "PATCH /campaigns/{campaign_id}": "operate",
     "POST /campaigns/{campaign_id}/answer": "operate",
     "POST /campaigns/{campaign_id}/pause": "operate",

@@ -195,6 +195,14 @@ async function begin() {
   await hasText("#campaign-plan", "k0 to 3 %");
   await page.click("#campaign-plan summary");
   seen.plan = await text("#campaign-plan");
+  await page.click("#campaign-start-test");
+  await hasText("#campaign-start-note", "it has no recipients");
+  const told = { ...document, notify: [{ mailto: "night@example.org" }] };
+  await give(JSON.stringify(told));
+  await hasText("#campaign-plan", "Dry run of morning");
+  await page.click("#campaign-start-test");
+  await hasText("#campaign-start-note", "was sent to all recipients");
+  seen.startsAfterTest = await page.locator("#campaign-begin").isEnabled();
   await check("start");
   await page.fill("#campaign-operator", "M. Curie");
   await page.click("#campaign-begin");

@@ -120,6 +120,12 @@ def plan(request: PlanCampaignRequest, context: Context) -> CampaignPlan:
     )
 
 
+@router.post("/campaigns/test-message", dependencies=[IDEMPOTENT])
+def try_recipients(request: PlanCampaignRequest) -> TestMessageResult:
+    """Send a test message to the recipients in a document; nothing is started."""
+    return TestMessageResult(result=send_test(parse_campaign(request.campaign, "the request")))
+
+
 @router.get("/campaigns/{campaign_id}")
 def get_campaign(campaign_id: str, context: Context) -> CampaignView:
     """Return a campaign with its queue, its cells, its trends and its newest events."""
@@ -194,7 +200,7 @@ def get_photo(campaign_id: str, item_id: str, context: Context) -> SnapshotRespo
 @router.post("/campaigns/{campaign_id}/test-message", dependencies=[IDEMPOTENT])
 def send_test_message(campaign_id: str, context: Context) -> TestMessageResult:
     """Send a test message to the recipients of a campaign."""
-    return TestMessageResult(result=send_test(_get(context.campaign_store, campaign_id)))
+    return TestMessageResult(result=send_test(_get(context.campaign_store, campaign_id).state.campaign))
 
 
 @router.get("/queue")

@@ -20,7 +20,7 @@ class StartCampaignRequest(View):
 
 
 class PlanCampaignRequest(View):
-    """Request of a dry run."""
+    """Request of a dry run, or of a test message, for a campaign that is not started."""
 
     campaign: dict[str, Any] = Field(description="document `mrbench.campaign/1`")
     identifiability: bool = Field(

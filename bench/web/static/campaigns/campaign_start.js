@@ -11,6 +11,7 @@ import { factList, table } from "../common/tables.js";
 const PLAN_TIMEOUT_MS = 120_000;
 /** Time [ms] that the assessment of all methods may take. */
 const ASSESSMENT_MS = 600_000;
+const TEST_TIMEOUT_MS = 30_000;
 /** Largest number of steps of a dry run that are listed. */
 const MAX_STEPS = 100;
 
@@ -21,6 +22,7 @@ export class CampaignStart {
     byId("campaign-document").addEventListener("input", () => this.forget());
     byId("campaign-file").addEventListener("change", ({ target }) => this.read(target.files[0]));
     byId("campaign-plan-button").addEventListener("click", () => this.plan());
+    byId("campaign-start-test").addEventListener("click", () => this.test());
     byId("campaign-form").addEventListener("submit", (event) => {
       event.preventDefault();
       this.start();
@@ -64,6 +66,18 @@ export class CampaignStart {
       this.note(plan.problems.length ? "The campaign cannot be started; see the problems." : "Dry run of this document; it can be started.", plan.problems.length > 0);
     } catch (problem) {
       this.note(problem instanceof SyntaxError ? `The document is not JSON: ${problem.message}.` : problem.after("There is no dry run"), true);
+    }
+  }
+
+  /** Tries the recipients of the document before the night; nothing is started. */
+  async test() {
+    this.note("The test message is sent …");
+    try {
+      const campaign = JSON.parse(byId("campaign-document").value);
+      const { result } = await post("campaigns/test-message", { campaign }, TEST_TIMEOUT_MS);
+      this.note(result === "sent" ? "The test message was sent to all recipients." : result, result !== "sent");
+    } catch (problem) {
+      this.note(problem instanceof SyntaxError ? `The document is not JSON: ${problem.message}.` : problem.after("No test message was sent"), true);
     }
   }
 

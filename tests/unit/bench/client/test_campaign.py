@@ -53,5 +53,7 @@ def test_a_script_starts_edits_answers_and_stops_a_campaign(bench, tmp_path):
         campaign.download_report(tmp_path / "report.doc", "doc")
     assert [one["id"] for one in bench.list_campaigns()] == [campaign.id]
     assert bench.find_campaign() is None
+    with pytest.raises(ClientError, match="no recipients"):
+        bench.send_test_message({"name": "night", "steps": [REST]})
     with pytest.raises(ClientError, match="at least one step"):
         bench.start_campaign({"name": "night", "steps": []})

@@ -137,6 +137,23 @@ def test_the_simulated_plant_needs_no_approval(tmp_path):
         assert len(store.edit(made.id, AddEdit(edit="add", steps=(RUN,)), 2.0).state.items) == 2
 
 
+def test_the_recipients_in_a_file_are_tried_before_the_campaign_is_started(tmp_path, capsys):
+    def run(path):
+        with pytest.raises(SystemExit) as end:
+            cli.main(["campaign", "test-message", str(path), "--data", str(tmp_path / "none")])
+        return end.value.code, capsys.readouterr()
+
+    with serve_webhook() as (address, received):
+        code, printed = run(write(tmp_path / "night.json", notify=[{"webhook": address}]))
+    assert (code or 0, printed.out.strip()) == (0, "sent")
+    assert [(one["kind"], one["campaign"]) for one in received] == [("test", "night")]
+    assert not (tmp_path / "none").exists()
+    for path, words in ((write(tmp_path / "b.json"), "no recipients"), (tmp_path / "c.json", "cannot be read")):
+        code, printed = run(path)
+        assert code == 1
+        assert words in printed.err
+
+
 def store_question(data, *, photo=True, count=1):
     """Store a campaign that asks for a photo, and return its id."""
     steps = [{"prompt": {"text": "Show the clevis", "photo": photo}}] * count

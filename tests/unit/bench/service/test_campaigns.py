@@ -385,6 +385,17 @@ def test_unknown_campaigns_and_missing_recipients_are_told(service):
     assert "no recipients" in service.post(f"/campaigns/{campaign['id']}/test-message", {}, 409)["detail"]
 
 
+def test_the_recipients_of_a_document_are_tried_before_it_is_started(service):
+    with serve_webhook() as (address, received):
+        document = {"name": "night", "steps": [RUN], "notify": [{"webhook": address}]}
+        assert service.post("/campaigns/test-message", {"campaign": document}) == {"result": "sent"}
+    assert (received[0]["campaign"], received[0]["kind"]) == ("night", "test")
+    service.post("/campaigns/test-message", {"campaign": document | {"steps": []}}, 422)
+    without = service.post("/campaigns/test-message", {"campaign": document | {"notify": []}}, 409)
+    assert "no recipients" in without["detail"]
+    assert service.get("/campaigns")["items"] == []
+
+
 def test_a_message_that_cannot_be_sent_is_shown_and_stops_nothing(service):
     refused = {"webhook": f"http://127.0.0.1:{find_closed_port()}/"}
     with serve_webhook() as (address, received):

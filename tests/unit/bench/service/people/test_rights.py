@@ -26,7 +26,8 @@ LOWEST = {
         PATCH /specimens/{serial}, POST /specimens/{serial}/trend, POST /campaigns,
         PATCH /campaigns/{campaign_id}, POST /campaigns/{campaign_id}/answer,
         POST /campaigns/{campaign_id}/pause, POST /campaigns/{campaign_id}/resume,
-        POST /campaigns/{campaign_id}/test-message, PATCH /queue, POST /runs/{run_id}/report/copies,
+        POST /campaigns/test-message, POST /campaigns/{campaign_id}/test-message, PATCH /queue,
+        POST /runs/{run_id}/report/copies,
         POST /runs/{run_id}/report/signatures, POST /campaigns/{campaign_id}/report/copies,
         POST /campaigns/{campaign_id}/report/signatures
     """,

@@ -11,6 +11,7 @@ from bench.campaigns.benches import (
 from bench.campaigns.document import (
     WARM_UP_METHOD,
     AnyStep,
+    BenchComparison,
     Campaign,
     CampaignDocumentError,
     CampaignError,
@@ -63,6 +64,7 @@ __all__ = [
     "AgentBench",
     "AgentConnection",
     "AnyStep",
+    "BenchComparison",
     "Campaign",
     "CampaignBench",
     "CampaignDocumentError",

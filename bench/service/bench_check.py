@@ -1,12 +1,16 @@
 """Comparison of a method with a bench, before anything moves."""
 
+from collections.abc import Mapping
+
 from bench.agent_protocol import BenchDescription
+from bench.campaigns import BenchComparison
 from bench.methods import Envelope, Method
 
 _DRIVE_WORDS = {"coil_v": "coil voltage", "coil_a": "coil current", "driver_command_v": "command of a driver"}
-_PEAKS = {"force": ("force_n", 1.0, "N"), "displacement": ("displacement_m", 1e3, "mm"),
-          "actuator_velocity": ("velocity_mps", 1e3, "mm/s")}  # fmt: skip
-"""Peak that each limit of the bench is compared with: its field, and factor and unit for people."""
+_MOTION = {"displacement": ("displacement_m", 1e3, "mm"), "actuator_velocity": ("velocity_mps", 1e3, "mm/s")}
+"""Peak of the motion that each limit of the bench is compared with: its field, and factor and unit for people."""
+_FORCE = {"force": ("force_n", 1.0, "N")}
+"""The same for the force, which is that of a typical damper."""
 _ACTIONS = ("hold", "controlled_stop", "trip")
 """Actions of the bench that end a motion."""
 
@@ -19,21 +23,25 @@ def describe_drive_obstacle(method: Method, drive_kind: str) -> str:
     return f"the method sets the {own}, this bench the {other}"
 
 
-def list_obstacles(bench: BenchDescription, method: Method, envelope: Envelope) -> list[str]:
-    """Return the reasons why a bench would refuse or stop a run of a method; none if it would not.
+def compare_with_bench(bench: BenchDescription, method: Method, envelope: Envelope) -> BenchComparison:
+    """Compare a method with a bench.
 
     Args:
         bench: drive and limits of the bench.
         method: the method.
-        envelope: its peaks.
+        envelope: its peaks; the force is that of a typical damper, so that it is only remarked on.
     """
-    return [*filter(None, [describe_drive_obstacle(method, bench.drive_kind)]), *_find_excesses(bench, envelope)]
+    drive = filter(None, [describe_drive_obstacle(method, bench.drive_kind)])
+    obstacles = (*drive, *_find_excesses(bench, envelope, _MOTION))
+    return BenchComparison(obstacles, tuple(_find_excesses(bench, envelope, _FORCE)))
 
 
-def _find_excesses(bench: BenchDescription, envelope: Envelope) -> list[str]:
+def _find_excesses(
+    bench: BenchDescription, envelope: Envelope, peaks: Mapping[str, tuple[str, float, str]]
+) -> list[str]:
     """Return a sentence for each peak beyond a limit of the bench that ends a motion."""
     found = []
-    for name, (field, factor, unit) in _PEAKS.items():
+    for name, (field, factor, unit) in peaks.items():
         peak, limit = getattr(envelope.total, field), bench.limits.get(name)
         values = [] if limit is None else [value for action in _ACTIONS if (value := getattr(limit, action))]
         if values and peak > min(values):

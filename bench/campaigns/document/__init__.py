@@ -32,7 +32,7 @@ from bench.campaigns.document.plan import (
     format_plan,
     plan_campaign,
 )
-from bench.campaigns.document.planned_methods import FindObstacles
+from bench.campaigns.document.planned_methods import BenchComparison, CompareWithBench
 from bench.campaigns.document.steps import (
     BenchSetupStep,
     DiagnosisGoal,
@@ -64,14 +64,15 @@ from bench.campaigns.document.strokes import (
 __all__ = [
     "WARM_UP_METHOD",
     "AnyStep",
+    "BenchComparison",
     "BenchSetupStep",
     "Campaign",
     "CampaignDocumentError",
     "CampaignError",
     "CampaignPlan",
+    "CompareWithBench",
     "DiagnosisGoal",
     "FindMethod",
-    "FindObstacles",
     "IntervalGoal",
     "Mail",
     "Matrix",

@@ -9,7 +9,7 @@ from bench.campaigns.document.document import Campaign
 from bench.campaigns.document.expansion import expand_campaign
 from bench.campaigns.document.planned_methods import (
     Assessment,
-    FindObstacles,
+    CompareWithBench,
     PlannedMethod,
     count_runs,
     plan_methods,
@@ -74,7 +74,7 @@ def plan_campaign(
     methods: Methods,
     assess: Assessment | None = None,
     free_bytes: int | None = None,
-    find_obstacles: FindObstacles | None = None,
+    compare: CompareWithBench | None = None,
     bench_unknown: str = "",
 ) -> CampaignPlan:
     """Return the dry run of a campaign.
@@ -84,7 +84,7 @@ def plan_campaign(
         methods: its methods by name.
         assess: assesses what strokes identify; None leaves that out.
         free_bytes: free space for logs [byte]; None if it is not known.
-        find_obstacles: compares a method with a bench; None if the bench is not known.
+        compare: compares a method with a bench; None if the bench is not known.
         bench_unknown: reason why it is not known.
 
     Raises:
@@ -93,7 +93,7 @@ def plan_campaign(
     """
     steps = expand_campaign(campaign)
     planned = _plan_steps(steps, methods)
-    used = plan_methods(steps, methods, assess, find_obstacles)
+    used = plan_methods(steps, methods, assess, compare)
     log_bytes = sum(step.log_bytes for step in planned)
     return CampaignPlan(
         campaign=campaign.name,
@@ -114,7 +114,7 @@ def find_problems(
     steps: tuple[Step, ...],
     methods: Methods,
     free_bytes: int | None = None,
-    find_obstacles: FindObstacles | None = None,
+    compare: CompareWithBench | None = None,
 ) -> tuple[str, ...]:
     """Return the reasons against the start of steps: limits of methods and bench, and the disk.
 
@@ -122,14 +122,14 @@ def find_problems(
         steps: expanded steps in order.
         methods: their methods by name.
         free_bytes: free space for logs [byte]; None if it is not known.
-        find_obstacles: compares a method with a bench; None if the bench is not known.
+        compare: compares a method with a bench; None if the bench is not known.
 
     Raises:
         CampaignError: a method does not fit its use.
         MethodError: a method cannot be compiled within its limits.
     """
     log_bytes = sum(step.log_bytes for step in _plan_steps(steps, methods))
-    return tuple(_find_problems(plan_methods(steps, methods, None, find_obstacles), log_bytes, free_bytes))
+    return tuple(_find_problems(plan_methods(steps, methods, None, compare), log_bytes, free_bytes))
 
 
 def describe_step(step: Step, methods: Methods) -> str:

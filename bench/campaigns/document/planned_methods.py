@@ -1,7 +1,7 @@
 """Dry run of the methods of a campaign: limits of method and bench, and what their strokes can identify."""
 
-from collections.abc import Callable, Sequence
-from typing import Any, TypeAlias
+from collections.abc import Callable
+from typing import Any, NamedTuple, TypeAlias
 
 from pydantic import Field
 
@@ -13,8 +13,19 @@ from bench.validation import FrozenModel
 
 Assessment: TypeAlias = Callable[[Programme], dict[str, Any]]
 """Function that returns the foresight document of a programme, such as `bench.runs.assess_design`."""
-FindObstacles: TypeAlias = Callable[[Method, Envelope], Sequence[str]]
-"""Function that returns the reasons why a bench would refuse or stop a run of a method."""
+
+
+class BenchComparison(NamedTuple):
+    """Method beside the bench that shall run it, in sentences for a person."""
+
+    obstacles: tuple[str, ...]
+    """Reasons why the bench would refuse or stop a run of it, whatever damper is tested."""
+    remarks: tuple[str, ...]
+    """Limits that a typical damper would exceed; the tested one may be weaker."""
+
+
+CompareWithBench: TypeAlias = Callable[[Method, Envelope], BenchComparison]
+"""Function that compares a method and its peaks with a bench."""
 
 
 class PlannedMethod(FrozenModel):
@@ -30,12 +41,15 @@ class PlannedMethod(FrozenModel):
     obstacles: tuple[str, ...] = Field(
         default=(), description="Reasons why the bench would refuse or stop its runs; empty without a known bench."
     )
+    remarks: tuple[str, ...] = Field(
+        default=(), description="Limits of the bench that a typical damper would exceed; they prevent no start."
+    )
     checkpoints: int = Field(description="[1] number of checkpoints.")
     identifiability: tuple[str, ...] = Field(description="Findings on what its strokes can identify.")
 
 
 def plan_methods(
-    steps: tuple[Step, ...], methods: Methods, assess: Assessment | None, find_obstacles: FindObstacles | None
+    steps: tuple[Step, ...], methods: Methods, assess: Assessment | None, compare: CompareWithBench | None
 ) -> tuple[PlannedMethod, ...]:
     """Return the methods of steps, each with each of its drives.
 
@@ -43,7 +57,7 @@ def plan_methods(
         steps: expanded steps.
         methods: their methods by name.
         assess: assesses what strokes identify; None leaves that out.
-        find_obstacles: compares a method with a bench; None if the bench is not known.
+        compare: compares a method with a bench; None if the bench is not known.
 
     Raises:
         CampaignError: a drive exceeds the limit of its method.
@@ -54,7 +68,7 @@ def plan_methods(
         if (run := find_run(step)) is not None:
             key = (get_method_name(run), run.drive)
             counts[key] = counts.get(key, 0) + count_runs(step)
-    return tuple(_plan_method(methods, key, count, assess, find_obstacles) for key, count in counts.items())
+    return tuple(_plan_method(methods, key, count, assess, compare) for key, count in counts.items())
 
 
 def _plan_method(
@@ -62,12 +76,13 @@ def _plan_method(
     key: tuple[str, float | None],
     count: int,
     assess: Assessment | None,
-    find_obstacles: FindObstacles | None,
+    compare: CompareWithBench | None,
 ) -> PlannedMethod:
     name, drive = key
     method = make_run_method(methods, RunSpec(specimen="any", method=name, drive=drive))
     programme = compile_method(method)
     envelope = compute_envelope(programme)
+    compared = BenchComparison((), ()) if compare is None else compare(method, envelope)
     return PlannedMethod(
         method=name,
         drive=drive,
@@ -76,7 +91,8 @@ def _plan_method(
         duration_s=programme.duration,
         force_n=envelope.total.force_n,
         verdict=envelope.verdict,
-        obstacles=() if find_obstacles is None else tuple(find_obstacles(method, envelope)),
+        obstacles=compared.obstacles,
+        remarks=compared.remarks,
         checkpoints=len(list_checkpoints(programme)),
         identifiability=_assess(programme, assess),
     )

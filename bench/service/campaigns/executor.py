@@ -27,7 +27,7 @@ from bench.config import get_executor
 from bench.disk import find_usable_space
 from bench.errors import AgentUnreachableError, MethodError
 from bench.log_lines import RepeatedFailure
-from bench.service.bench_check import list_obstacles
+from bench.service.bench_check import compare_with_bench
 from bench.threads import BackgroundThread
 
 PERIOD = 0.5
@@ -96,11 +96,11 @@ class CampaignExecutor(BackgroundThread):
         self.store.check_needs(campaign, steps, methods)
         self.bench.check_needs(campaign, steps)
         try:
-            find_obstacles = partial(list_obstacles, self._describe_bench())
+            compare = partial(compare_with_bench, self._describe_bench())
         except AgentUnreachableError as error:
             raise CampaignError(f"the limits of the bench are not known: {error}") from None
         free = find_usable_space(self.store.catalogue.folder)
-        if problems := find_problems(tuple(steps), methods, free, find_obstacles):
+        if problems := find_problems(tuple(steps), methods, free, compare):
             raise CampaignError(f"the campaign cannot be run: {problems[0]}")
 
     def _run(self) -> None:

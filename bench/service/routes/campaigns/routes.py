@@ -33,7 +33,7 @@ from bench.campaigns import (
 )
 from bench.disk import find_usable_space
 from bench.service.audit import note_old
-from bench.service.bench_check import list_obstacles
+from bench.service.bench_check import compare_with_bench
 from bench.service.benches import ServedBench
 from bench.service.context import Context, ServiceContext
 from bench.service.files import SnapshotResponse, describe_file
@@ -115,7 +115,7 @@ def plan(request: PlanCampaignRequest, context: Context) -> CampaignPlan:
         methods,
         assess_programme if request.identifiability else None,
         find_usable_space(context.data),
-        None if bench is None else partial(list_obstacles, bench),
+        None if bench is None else partial(compare_with_bench, bench),
         unknown,
     )
 

@@ -7,7 +7,7 @@ from fastapi import APIRouter
 from bench.disk import RESERVE, estimate_log_size, find_free_space
 from bench.errors import RunError
 from bench.methods import Envelope, Method, compile_method, compute_envelope, list_checkpoints, parse_method
-from bench.service.bench_check import list_obstacles
+from bench.service.bench_check import compare_with_bench
 from bench.service.context import Context, ServiceContext
 from bench.service.routes.planning.assessments import MAX_SAMPLES, assess_programme
 from bench.service.routes.planning.method_library import find_method
@@ -54,7 +54,8 @@ def _check_bench(context: ServiceContext, name: str | None, method: Method, enve
         return BenchCheck(limits={}, obstacles=(), unknown=unknown, log_bytes=None, free_bytes=free)
     rates = (channel.rate_hz for name, channel in bench.channels.items() if name != "coil_drive")
     size = estimate_log_size(envelope.total.duration_s, rates)
-    obstacles = list_obstacles(bench, method, envelope)
+    compared = compare_with_bench(bench, method, envelope)
+    obstacles = [*compared.obstacles, *compared.remarks]
     if free is not None and free < size + RESERVE:
         obstacles.append(f"the log needs up to {size / 1e9:.3f} GB, the disk has {free / 1e9:.3f} GB free")
     return BenchCheck(limits=bench.limits, obstacles=tuple(obstacles), unknown="", log_bytes=size, free_bytes=free)

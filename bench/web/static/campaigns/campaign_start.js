@@ -132,7 +132,7 @@ function describePlan(plan, words) {
 function makeMethodTable(methods) {
   const { scale, unit } = QUANTITIES.force;
   return table("Methods", ["Method", "Runs", "One run", "Force, at most", "Limits", "Checkpoints"], methods.map((one) => [
-    `${one.method}, ${describeDrive(one.drive, one.drive_unit)}`, one.runs, duration(one.duration_s), `${significant(one.force_n * scale)} ${unit}`, [one.verdict, ...one.obstacles].join("; "), one.checkpoints,
+    `${one.method}, ${describeDrive(one.drive, one.drive_unit)}`, one.runs, duration(one.duration_s), `${significant(one.force_n * scale)} ${unit}`, [one.verdict, ...one.obstacles, ...one.remarks].join("; "), one.checkpoints,
   ]));
 }
 

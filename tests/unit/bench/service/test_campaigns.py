@@ -7,7 +7,7 @@ from contextlib import suppress
 import pytest
 
 from bench import cli
-from bench.agent_protocol import InstrumentStatus, PauseCommand, PrepareCommand, RunCommand
+from bench.agent_protocol import BenchLimit, InstrumentStatus, PauseCommand, PrepareCommand, RunCommand
 from bench.campaigns import CampaignStore, collect_methods, parse_campaign
 from bench.service.routes.planning import assessments
 from tests.support.certificates import make_certificate
@@ -314,23 +314,33 @@ def test_a_plan_says_what_each_method_can_identify_and_assesses_equal_ones_once(
     assessments._assess.cache_clear()
 
 
-def limit_force(service, force):
-    """Set the force at which the bench stops [N]."""
-    limit = service.agent.description.limits["force"].model_copy(update={"controlled_stop": force})
-    service.agent.description = service.agent.description.model_copy(update={"limits": {"force": limit}})
+def set_limit(service, quantity, value):
+    """Set the value at which the bench stops."""
+    limit = BenchLimit(unit="", indicate=None, hold=None, controlled_stop=value, trip=None)
+    service.agent.description = service.agent.description.model_copy(update={"limits": {quantity: limit}})
+
+
+def test_a_force_that_only_a_typical_damper_has_is_remarked_on_and_refuses_nothing(service):
+    set_limit(service, "force", 300.0)
+    plan = make_plan(service, [RUN], identifiability=False)
+    assert plan["methods"][0]["remarks"] == ["force 647.9 N exceeds the bench's 300 N"]
+    assert (plan["problems"], plan["methods"][0]["obstacles"]) == ([], [])
+    start(service, [RUN])
 
 
 def test_a_step_that_exceeds_the_bench_is_refused_before_the_start(service):
-    limit_force(service, 300.0)
-    problem = "method quick: force 647.9 N exceeds the bench's 300 N"
+    set_limit(service, "displacement", 4e-3)
     plan = make_plan(service, [RUN], identifiability=False)
+    (excess,) = plan["methods"][0]["obstacles"]
+    assert excess.startswith("displacement ")
+    assert excess.endswith(" mm exceeds the bench's 4 mm")
+    problem = f"method quick: {excess}"
     assert plan["problems"] == [problem]
-    assert plan["methods"][0]["obstacles"] == ["force 647.9 N exceeds the bench's 300 N"]
     assert problem in start(service, [RUN], 409)["detail"]
     campaign = create_on_command_line(service, [RUN])
     ended = wait(service, {"id": campaign.id}, lambda found: found["status"] == "stopped")
     assert problem in ended["reason"]
-    limit_force(service, 2000.0)
+    set_limit(service, "displacement", 0.05)
     start(service, [RUN])
 
 

@@ -11,7 +11,8 @@ from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from typing import NamedTuple
 
-from benchmarks.accuracy.drawn_effects import Case, draw_case
+from benchmarks.accuracy.drawn_effects import draw_case
+from benchmarks.common.drawn_cases import Case
 from benchmarks.common.drawn_table import list_seeds, make_parser, run_trial
 from identification.damper.effects import EFFECTS, Place, Variable
 from identification.documents import Diagnosis

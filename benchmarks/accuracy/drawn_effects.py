@@ -1,6 +1,7 @@
 """Diagnoses of dampers of any size with drawn forms of effects, causes outside the library, or none.
 
-    python -m benchmarks.accuracy.drawn_effects [--recordings 60] [--seed 1] [--kinds one,unknown] [--out PAGE.md]
+    python -m benchmarks.accuracy.drawn_effects [--recordings 60] [--seed 1] [--kinds one,unknown] [--keep FILE]
+        [--out PAGE.md]
 
 Each recording has a random damper from 10 N to 400 kN, a noise spectrum, and one of: no effect, one effect, two
 effects, or an unknown cause whose place and variable no effect of the library has. Forms are drawn from the class
@@ -8,37 +9,36 @@ of functions of their effect (`benchmarks.common.drawn_forms`), so that no list 
 that of the identification: only the forms are independent of it, not the integrator.
 """
 
-import argparse
-import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
-from itertools import cycle
+from functools import partial
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
 from benchmarks.accuracy.noise_floor import SIZES, Size, draw_damper
 from benchmarks.accuracy.null_verdicts import DRIVES, RATE, STROKES, make_strokes
+from benchmarks.common.drawn_cases import (
+    COLUMNS,
+    EFFECT_COUNTS,
+    Case,
+    Outcome,
+    continue_trial,
+    diagnose_case,
+    format_row,
+    format_summary,
+    read_options,
+)
 from benchmarks.common.drawn_forms import DRAWN_EFFECTS, DrawnForm, draw_form
 from benchmarks.common.drawn_noise import RELATIVE_NOISE, SPECTRA, draw_noise, make_stretch, round_to
-from benchmarks.common.drawn_table import list_seeds, make_parser, run_trial
+from benchmarks.common.drawn_table import run_trial
 from identification.arrays import Array
 from identification.damper import Coordinates, DamperSize
 from identification.damper.effects import EFFECTS, Stage
-from identification.documents import Diagnosis
-from identification.errors import IdentificationError
-from identification.gap import diagnose
 from identification.logs import Recording
 from identification.simulate import ActiveEffect, Excitation, SimulationModel, simulate
-from sim_rig.trial.scoring import is_confident
 
-KINDS = ("none", "one", "one", "one", "two", "unknown")
-"""Kinds of cases, in turn."""
-EFFECT_COUNTS = {"one": 1, "two": 2, "three": 3}
-"""Number of effects in each kind of cases with known effects."""
-COLUMNS = ("case", "error of the law over the floor", "verdict", "named", "stage", "with them", "right")
 SMALLEST_CHANGE, LARGEST_CHANGE = 2.0, 30.0
 """Change of the force by an effect, over the noise [1]; a refit of the law removes a part of it."""
 UNKNOWN_CAUSES: dict[str, Stage] = {
@@ -54,74 +54,9 @@ _CALIBRATIONS = 4
 """Steps in which the strength of an effect is set."""
 
 
-class Case(NamedTuple):
-    """A recording and its true cause."""
-
-    recording: Recording
-    kind: str
-    effects: frozenset[str]
-    label: str
-    stages: frozenset[Stage]
-    """Stages of its cause."""
-
-
-class Outcome(NamedTuple):
-    """Answer to one case."""
-
-    case: str
-    kind: str
-    truth: frozenset[str]
-    named: frozenset[str]
-    verdict: str
-    stage: str | None
-    """Most probable stage."""
-    blamed: bool
-    """True if an effect that is not at work is named with confidence, or the answer explains an unknown cause."""
-    ratio: float
-    """Error of the refitted law over the noise floor [1]."""
-    after: float
-    """Error with the named effects over the noise floor [1]."""
-    is_among_four: bool
-    stage_right: bool
-
-    @property
-    def right(self) -> bool:
-        """True if the verdict and the named set are right."""
-        if self.kind == "none":
-            return self.verdict == "no_gap"
-        if self.kind == "unknown":
-            return not self.blamed and self.verdict != "refused"
-        return self.named == self.truth
-
-
 def try_case(job: tuple[int, str]) -> Outcome:
     """Draw, record and diagnose one case of a kind."""
     return diagnose_case(draw_case(*job))
-
-
-def diagnose_case(case: Case) -> Outcome:
-    """Diagnose a case and judge the answer; a refused recording is a wrong one."""
-    try:
-        return judge(case, diagnose([case.recording]).diagnosis)
-    except IdentificationError:
-        nothing: frozenset[str] = frozenset()
-        return Outcome(
-            case.label, case.kind, case.effects, nothing, "refused", None, False, math.nan, math.nan, False, False
-        )
-
-
-def judge(case: Case, diagnosis: Diagnosis) -> Outcome:
-    """Compare a diagnosis with the truth."""
-    named = frozenset(e.name for e in diagnosis.effects)
-    confident = {e.name for e in diagnosis.effects if is_confident(e.probability, e.share)}
-    explained_unknown = case.kind == "unknown" and diagnosis.verdict == "explained"
-    sets = [named, *(frozenset(a.effects) for a in diagnosis.alternatives)]
-    return Outcome(
-        case.label, case.kind, case.effects, named, diagnosis.verdict, diagnosis.where.stage,
-        bool(confident - case.effects) or explained_unknown,
-        diagnosis.gap.before_n / diagnosis.gap.noise_floor_n, diagnosis.gap.after_n / diagnosis.gap.noise_floor_n,
-        case.effects in sets, not case.stages or diagnosis.where.stage in case.stages,
-    )  # fmt: skip
 
 
 def draw_case(seed: int, kind: str) -> Case:
@@ -248,61 +183,12 @@ def _draw_wave(random: np.random.Generator) -> Callable[[Array], Array]:
     return wave
 
 
-def format_summary(outcomes: Sequence[Outcome]) -> list[str]:
-    """Return the table of right answers by kind."""
-    groups = {
-        "no effect": [o for o in outcomes if o.kind == "none"],
-        "one effect": [o for o in outcomes if o.kind == "one"],
-        "two effects": [o for o in outcomes if o.kind == "two"],
-        "three effects": [o for o in outcomes if o.kind == "three"],
-        "unknown cause": [o for o in outcomes if o.kind == "unknown"],
-    }
-    lines = [
-        "| recordings | right | true set among four | right stage | blamed |",
-        "| --- | --- | --- | --- | --- |",
-    ]
-    for name, rows in groups.items():
-        if rows:
-            counts = (
-                sum(getattr(o, f) for o in rows) for f in ("right", "is_among_four", "stage_right", "blamed")
-            )
-            lines.append(f"| {name} | " + " | ".join(f"{c} of {len(rows)}" for c in counts) + " |")
-    return lines
-
-
-def format_row(o: Outcome) -> str:
-    """Return one case as a row."""
-    named = " and ".join(sorted(o.named)) or "-"
-    stage = (o.stage or "-") + ("" if o.stage_right else " (**no**)")
-    return (
-        f"| {o.case} | {o.ratio:.2f} | {o.verdict} | {named} | {stage} | {o.after:.2f} "
-        f"| {'yes' if o.right else '**no**'} |"
-    )
-
-
-def read_options(
-    description: str | None, count: int, methods: Sequence[str] = ()
-) -> tuple[argparse.Namespace, list[tuple[int, str]]]:
-    """Return the options of the command line, and the seed and kind of each case.
-
-    Args:
-        description: text of the help.
-        count: usual number of cases.
-        methods: usual methods, as often as they are drawn; no option for them if empty.
-    """
-    parser = make_parser(description, "recordings", count)
-    parser.add_argument("--kinds", default=",".join(KINDS), help="kinds of cases, in turn")
-    if methods:
-        parser.add_argument("--methods", default=",".join(methods), help="methods to draw from, equally often")
-    options = parser.parse_args()
-    return options, list(zip(list_seeds(options), cycle(options.kinds.split(",")), strict=False))
-
-
 def main() -> None:
     """Print every case and the summary; also write them to a page."""
     options, jobs = read_options(__doc__, 60)
     with ProcessPoolExecutor(options.jobs) as pool:
-        run_trial(COLUMNS, pool.map(try_case, jobs), format_row, format_summary, options.out)
+        outcomes = continue_trial(jobs, options.keep, partial(pool.map, try_case))
+        run_trial(COLUMNS, outcomes, format_row, format_summary, options.out)
 
 
 if __name__ == "__main__":

@@ -19,17 +19,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.accuracy.drawn_effects import (
+from benchmarks.common import run_mrbench
+from benchmarks.common.drawn_cases import (
     COLUMNS,
     EFFECT_COUNTS,
     Case,
     Outcome,
+    continue_trial,
     diagnose_case,
     format_row,
     format_summary,
     read_options,
 )
-from benchmarks.common import run_mrbench
 from benchmarks.common.drawn_noise import SPECTRA, draw_noise, round_to
 from benchmarks.common.drawn_table import run_trial
 from benchmarks.independent.causes import KNOWN, UNKNOWN, Cause, Scales
@@ -189,7 +190,7 @@ def main() -> None:
     options, jobs = read_options(__doc__, 30, METHODS)
     with TemporaryDirectory() as folder, ProcessPoolExecutor(options.jobs) as pool:
         run_one = partial(try_case, folder=Path(folder), methods=options.methods.split(","))
-        outcomes = pool.map(run_one, jobs)
+        outcomes = continue_trial(jobs, options.keep, partial(pool.map, run_one))
         run_trial(COLUMNS, outcomes, format_row, format_summary, options.out)
 
 

@@ -1,6 +1,6 @@
 // Table of a batch: state and answer of the job of each run, with force errors in the chosen unit.
 
-import { keep } from "../campaigns/refresh.js";
+import { keep } from "../common/refresh.js";
 import { element, instant, localTime, significant, spaced, zone } from "../common/format.js";
 import { QUANTITIES } from "../common/quantities.js";
 import { runAddress } from "../common/router.js";

@@ -1,7 +1,7 @@
 // One batch at its address: a table with the result on each run, requested again until all jobs have ended.
 
 import { isAsking } from "../account/sign_in.js";
-import { refresh } from "../campaigns/refresh.js";
+import { refresh } from "../common/refresh.js";
 import { get, saveFile } from "../common/api.js";
 import { byId, element, write } from "../common/format.js";
 import { describeBatch, makeBatchTable } from "./batch_table.js";

@@ -78,6 +78,8 @@ def test_an_edit_of_a_campaign_has_its_former_queue(service, client, campaign):
 def test_a_run_that_a_campaign_starts_is_an_act_of_the_campaign(service, campaign):
     wait_for(lambda: any(isinstance(one, RunCommand) for one in service.agent.commands))
     path = service.data / "audit.jsonl"
-    found = wait_for(lambda: [one for one in list_all(path) if one.actor.startswith("campaign:")])
-    assert (found[0].actor, found[0].action) == (f"campaign:{campaign['id']}", "run by the service")
+    found = wait_for(lambda: [one for one in list_all(path) if one.action == "run by the service"])
+    assert [one.actor for one in found] == [f"campaign:{campaign['id']}"]
     assert (found[0].new["specimen"], found[0].new["method"]["name"], found[0].outcome) == ("MR-1", "quick", "ok")
+    (lease,) = [one for one in list_all(path) if one.action == "lease by the service"]
+    assert (lease.actor, lease.outcome) == (found[0].actor, "ok")

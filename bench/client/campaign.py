@@ -1,13 +1,12 @@
 """One campaign of the service."""
 
 import base64
-import time
 import uuid
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from bench.client.errors import ClientError
+from bench.client.polling import wait_for_state
 from bench.client.session import Session, quote_name
 from bench.client.signed_reports import SignedReports
 
@@ -117,12 +116,13 @@ class Campaign(SignedReports):
         Raises:
             ClientError: neither has happened in time, or the service cannot be reached.
         """
-        deadline = time.monotonic() + timeout
-        while not _needs_attention(state := self.get_state()):
-            if time.monotonic() > deadline:
-                raise ClientError(f"campaign {self.id} is {state['status']} after {timeout:g} s")
-            time.sleep(_POLL_PERIOD)
-        return state
+        return wait_for_state(
+            self.get_state,
+            _needs_attention,
+            timeout,
+            lambda state: f"campaign {self.id} is {state['status']} after {timeout:g} s",
+            _POLL_PERIOD,
+        )
 
     def _post(self, verb: str, content: Mapping[str, Any], key: str | None = None) -> dict[str, Any]:
         return dict(self._session.post(f"{self._path}/{verb}", content, key))

@@ -1,15 +1,11 @@
 """One job of the service."""
 
-import time
 import uuid
 from typing import Any
 
-from bench.client.errors import ClientError
+from bench.client.polling import wait_for_state
 from bench.client.session import Session, quote_name
 from bench.client.states import JobState, parse_job_state
-
-_POLL_PERIOD = 0.5
-"""Time [s] between two requests while a script waits."""
 
 
 class Job:
@@ -44,12 +40,12 @@ class Job:
         Raises:
             ClientError: it is not finished in time, or the service cannot be reached.
         """
-        deadline = time.monotonic() + timeout
-        while not (state := self.get_state()).is_finished:
-            if time.monotonic() > deadline:
-                raise ClientError(f"job {self.id} has not ended within {timeout:g} s; its state is {state.state}")
-            time.sleep(_POLL_PERIOD)
-        return state
+        return wait_for_state(
+            self.get_state,
+            lambda state: state.is_finished,
+            timeout,
+            lambda state: f"job {self.id} has not ended within {timeout:g} s; its state is {state.state}",
+        )
 
     def cancel(self) -> JobState:
         """Cancel the job, and return its state; the work on it ends within a second.

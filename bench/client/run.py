@@ -1,21 +1,17 @@
 """One run of the service."""
 
-import time
 import uuid
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 from bench.client.arrays import Arrays, make_arrays
-from bench.client.errors import ClientError
 from bench.client.job import Job
+from bench.client.polling import wait_for_state
 from bench.client.session import STOP_TIMEOUT, Session, quote_name
 from bench.client.signed_reports import SignedReports
 from bench.client.states import RunState, parse_run_state
 from bench.log import Format
-
-_POLL_PERIOD = 0.5
-"""Time [s] between two requests while a script waits."""
 
 
 class Run(SignedReports):
@@ -227,9 +223,9 @@ class Run(SignedReports):
                 return
 
     def _wait(self, is_reached: Callable[[RunState], bool], timeout: float, goal: str) -> RunState:
-        deadline = time.monotonic() + timeout
-        while not is_reached(state := self.get_state()):
-            if time.monotonic() > deadline:
-                raise ClientError(f"run {self.id} has not {goal} within {timeout:g} s; its state is {state.state}")
-            time.sleep(_POLL_PERIOD)
-        return state
+        return wait_for_state(
+            self.get_state,
+            is_reached,
+            timeout,
+            lambda state: f"run {self.id} has not {goal} within {timeout:g} s; its state is {state.state}",
+        )

@@ -1,13 +1,14 @@
 """States of runs and jobs in the answers of the service."""
 
 from datetime import datetime
-from typing import Any
+from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from bench.client.errors import ClientError
 from bench.validation import describe_validation_error
 
+State = TypeVar("State", bound=BaseModel)
 _UNFINISHED_JOBS = ("queued", "running")
 _IDENTIFIED_OUTCOMES = ("clean", "lossy")
 """Outcomes of a run of the bench that the service identifies by itself."""
@@ -81,11 +82,7 @@ def parse_job_state(content: Any) -> JobState:
     Raises:
         ClientError: it is not the state of a job.
     """
-    try:
-        return JobState.model_validate(content)
-    except ValidationError as error:
-        reason = describe_validation_error(error, "the job")
-        raise ClientError(f"the reply is not a job ({reason}); use a client of the service's version") from error
+    return _parse(content, JobState, "job")
 
 
 def parse_run_state(content: Any) -> RunState:
@@ -94,8 +91,14 @@ def parse_run_state(content: Any) -> RunState:
     Raises:
         ClientError: it is not the state of a run.
     """
+    return _parse(content, RunState, "run")
+
+
+def _parse(content: Any, kind: type[State], name: str) -> State:
     try:
-        return RunState.model_validate(content)
+        return kind.model_validate(content)
     except ValidationError as error:
-        reason = describe_validation_error(error, "the run")
-        raise ClientError(f"the reply is not a run ({reason}); use a client of the service's version") from error
+        reason = describe_validation_error(error, f"the {name}")
+        raise ClientError(
+            f"the reply is not a {name} ({reason}); use a client of the service's version"
+        ) from error

@@ -5,14 +5,12 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
 from bench.agent_protocol import (
     AgentStatus,
     LeaseCommand,
-    Message,
     PauseCommand,
     RunCommand,
     RunStatus,
@@ -20,6 +18,7 @@ from bench.agent_protocol import (
     get_sender,
 )
 from bench.campaigns.benches.agent_setup import AgentSetup, find_setup
+from bench.campaigns.benches.protocol import AgentConnection
 from bench.campaigns.benches.recovery import make_end_report, recover_execution
 from bench.campaigns.benches.results import read_result
 from bench.campaigns.document import Campaign, CampaignError, Step
@@ -47,24 +46,6 @@ _LEASE_PERIOD = 5.0
 """[s] Time between two renewals of the lease."""
 _START_PERIOD = 0.1
 """[s] Time between two requests of the status after a start."""
-
-
-class AgentConnection(Protocol):
-    """Connection to the agent, such as the monitor of the service."""
-
-    def get_status(self) -> AgentStatus:
-        """Return the current status.
-
-        Raises:
-            BenchError: the agent does not answer.
-        """
-
-    def send_command(self, command: Message, timeout: float = 5.0) -> AgentStatus:
-        """Send a command and return the status after it.
-
-        Raises:
-            BenchError: the agent refuses it or does not answer.
-        """
 
 
 class Thermometer:

@@ -4,9 +4,8 @@ The status of the agent has the latest setup step only, without an id. A process
 therefore accepts a result only if the step had been seen in progress. Else the step counts as interrupted.
 """
 
-from typing import Protocol
-
-from bench.agent_protocol import AgentStatus, Message, PrepareCommand, SetupStatus, StatusCommand
+from bench.agent_protocol import AgentStatus, PrepareCommand, SetupStatus, StatusCommand
+from bench.campaigns.benches.protocol import AgentConnection
 from bench.campaigns.document import BenchSetupStep, SetupSpec
 from bench.campaigns.engine import Active, ExecutionReport
 from bench.campaigns.store import StoredCampaign
@@ -18,21 +17,10 @@ _RESTARTED = "the rig agent was restarted before the step had ended"
 _FOLLOWED = "another setup step followed before its result was read"
 
 
-class CommandConnection(Protocol):
-    """Connection that sends commands to the agent."""
-
-    def send_command(self, command: Message, timeout: float = 5.0) -> AgentStatus:
-        """Send a command and return the status after it.
-
-        Raises:
-            BenchError: the agent refuses it or does not answer.
-        """
-
-
 class AgentSetup:
     """Executor of the setup steps of campaigns on one agent."""
 
-    def __init__(self, agent: CommandConnection) -> None:
+    def __init__(self, agent: AgentConnection) -> None:
         self._agent = agent
         self._sent = ""
         self._is_taken_over = False

@@ -1,11 +1,30 @@
-"""Benches that execute campaigns: the rig agent, or the simulated plant."""
+"""Benches that execute campaigns, the rig agent or the simulated plant, and the connection to an agent."""
 
 from collections.abc import Sequence
 from typing import Protocol
 
+from bench.agent_protocol import AgentStatus, Message
 from bench.campaigns.document import Campaign, Step
 from bench.campaigns.engine import ExecutionReport, Observation
 from bench.campaigns.store import StoredCampaign
+
+
+class AgentConnection(Protocol):
+    """Connection to the agent, such as the monitor of the service."""
+
+    def get_status(self) -> AgentStatus:
+        """Return the current status.
+
+        Raises:
+            BenchError: the agent does not answer.
+        """
+
+    def send_command(self, command: Message, timeout: float = 5.0) -> AgentStatus:
+        """Send a command and return the status after it.
+
+        Raises:
+            BenchError: the agent refuses it or does not answer.
+        """
 
 
 class CampaignBench(Protocol):

@@ -40,27 +40,18 @@ _BY_KIND = Discriminator(
     custom_error_type="step_kind",
     custom_error_message=f"a step has exactly one of the keys {', '.join(STEP_KINDS)}",
 )
-AnyStep: TypeAlias = Annotated[
+_OtherStep: TypeAlias = (
     Annotated[RunStep, Tag("run")]
     | Annotated[RestStep, Tag("rest")]
     | Annotated[WarmUpStep, Tag("warm_up")]
-    | Annotated[RepeatStep, Tag("repeat")]
     | Annotated[NextStrokeStep, Tag("next_stroke")]
     | Annotated[PromptStep, Tag("prompt")]
-    | Annotated[BenchSetupStep, Tag("setup")],
-    _BY_KIND,
-]
+    | Annotated[BenchSetupStep, Tag("setup")]
+)
+"""A step that is no repetition."""
+AnyStep: TypeAlias = Annotated[_OtherStep | Annotated[RepeatStep, Tag("repeat")], _BY_KIND]
 """A step, recognised by its only key."""
-CellStep: TypeAlias = Annotated[
-    Annotated[RunStep, Tag("run")]
-    | Annotated[RestStep, Tag("rest")]
-    | Annotated[WarmUpStep, Tag("warm_up")]
-    | Annotated[CellRepeatStep, Tag("repeat")]
-    | Annotated[NextStrokeStep, Tag("next_stroke")]
-    | Annotated[PromptStep, Tag("prompt")]
-    | Annotated[BenchSetupStep, Tag("setup")],
-    _BY_KIND,
-]
+CellStep: TypeAlias = Annotated[_OtherStep | Annotated[CellRepeatStep, Tag("repeat")], _BY_KIND]
 """A step after the run of a cell, which can repeat that run."""
 
 

@@ -199,9 +199,14 @@ def minimise(
 def solve_bounded_step(
     problem: Problem, here: Evaluation, free: BoolArray, damping: Array, unknowns: Array
 ) -> Array:
-    """Return the damped Gauss-Newton step (U,) within the bounds, scaled to the largest allowed length."""
+    """Return the damped Gauss-Newton step (U,) within the bounds, scaled to the largest allowed length.
+
+    The step is zero where the simulation diverges, since such a point has no derivatives.
+    """
     low, high = problem.get_bounds()
     step, moving = np.zeros(len(unknowns)), free.copy()
+    if not np.isfinite(here.hessian).all():
+        return step
     for _ in range(len(unknowns)):
         fixed = here.hessian[np.ix_(moving, ~moving)] @ step[~moving]
         matrix = here.hessian[np.ix_(moving, moving)] + np.diag(damping[moving])

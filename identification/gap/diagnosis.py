@@ -25,6 +25,7 @@ from identification.gap.selection import (
     settle_floor,
 )
 from identification.logs import Recording
+from identification.numerical_errors import translate_numerical_errors
 from identification.pipeline import make_problem
 from identification.progress import Progress, enter_stage, ignore_progress
 from identification.signals import check_recordings, check_single_specimen, mask_invalid_samples
@@ -65,7 +66,7 @@ def diagnose(
 
     Raises:
         UnusableDataError: the recordings are too short, clipped, of different specimens, or do not contain force
-            and motion of a damper.
+            and motion of a damper; or they do not determine one.
     """
     prepared = prepare_recordings(recordings, hold_out)
     return diagnose_prepared(
@@ -91,6 +92,7 @@ class PreparedRecordings:
     """Messages about excluded samples."""
 
 
+@translate_numerical_errors()
 def prepare_recordings(recordings: Sequence[Recording], hold_out: HoldOut | None = None) -> PreparedRecordings:
     """Check, clean and smooth recordings of one damper, and cut them into cycles.
 
@@ -110,6 +112,7 @@ def prepare_recordings(recordings: Sequence[Recording], hold_out: HoldOut | None
     return PreparedRecordings(dataset, evaluation, [*dataset.notes, *evaluation.notes, *notes])
 
 
+@translate_numerical_errors()
 def diagnose_prepared(
     prepared: PreparedRecordings,
     model: DamperModel | None = None,

@@ -7,10 +7,10 @@ from pathlib import Path
 from identification.documents import Fit
 from identification.errors import IdentificationError
 from identification.logs import load
+from identification.numerical_errors import translate_numerical_errors
 from identification.pipeline.fit_input import FitInput, prepare_fit
 from identification.pipeline.fit_request import FitRequest
 from identification.pipeline.identification import fit_damper
-from identification.pipeline.numerical_errors import translate_numerical_errors
 from identification.pipeline.pinn_stage import NetworkResult, train_networks
 from identification.progress import Progress, ignore_progress
 

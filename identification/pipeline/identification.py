@@ -13,6 +13,7 @@ from identification.documents import Fit, FitStage, Provenance
 from identification.errors import IdentificationError
 from identification.fitting import Dataset, Minimum, Problem, compute_rmse, fit_output_error
 from identification.logs import Recording, Stretch
+from identification.numerical_errors import translate_numerical_errors
 from identification.pipeline.fit_document import (
     MISFIT_RATIO,
     FitResult,
@@ -22,7 +23,6 @@ from identification.pipeline.fit_document import (
 )
 from identification.pipeline.fit_input import FitInput, prepare_fit
 from identification.pipeline.fit_request import FitRequest
-from identification.pipeline.numerical_errors import translate_numerical_errors
 from identification.pipeline.pinn_stage import (
     NetworkResult,
     compare_with_network,

@@ -32,8 +32,6 @@ def take_joint_step(problem: Problem, unknowns: Array) -> tuple[StartPoint, Eval
         The best point, the evaluation at the given unknowns, and the cost that the full step predicts.
     """
     here = problem.evaluate(unknowns)
-    if not np.isfinite(here.cost):
-        return StartPoint(unknowns), here, np.inf
     step, predicted = predict_joint_step(problem, here, unknowns)
     return _search_line(problem, StartPoint(unknowns, here.cost), step, predicted), here, predicted
 
@@ -56,7 +54,12 @@ def _search_line(problem: Problem, start: StartPoint, step: Array, predicted: fl
 
 
 def predict_joint_step(problem: Problem, here: Evaluation, unknowns: Array) -> tuple[Array, float]:
-    """Return the Gauss-Newton step (U,) inside the bounds, with fixed delays, and the cost that it predicts."""
+    """Return the Gauss-Newton step (U,) inside the bounds, with fixed delays, and the cost that it predicts.
+
+    Where the simulation diverges, the step is zero and the cost infinite.
+    """
+    if not np.isfinite(here.cost):
+        return np.zeros(len(unknowns)), np.inf
     free = problem.free_mask & ~problem.delay_mask
     scale = np.diag(here.hessian)
     damping = _DAMPING * np.maximum(scale, 1e-9 * scale.max())

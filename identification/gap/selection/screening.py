@@ -109,9 +109,9 @@ def select_unpredicted(gains: Sequence[ScreeningResult], count: int) -> list[Scr
     """Return effects for which the linear step predicts a loss in every form, each in its best form.
 
     Such an effect has no zero size. It is linearised at a size that the recording does not have, which says
-    nothing about its gain.
+    nothing about its gain. An effect whose starts all diverge cannot be fitted, and is left out.
     """
-    return [gain for gain in select_best_forms(gains) if compute_expected_gain(gain) < 0.0][:count]
+    return [g for g in select_best_forms(gains) if -np.inf < compute_expected_gain(g) < 0.0][:count]
 
 
 def select_best_forms(gains: Sequence[ScreeningResult]) -> list[ScreeningResult]:

@@ -517,6 +517,13 @@ def test_damping_shortens_a_step_and_a_fixed_unknown_stays():
     assert fixed == pytest.approx([3.5 / 7.0, 0.0])
 
 
+def test_there_is_no_step_from_a_point_where_the_simulation_diverges():
+    problem = Parabola((1.0, -0.5))
+    diverged = Evaluation(np.inf, np.array([[0.0, 0.0], [0.0, np.nan]]), np.array([np.nan, 1.0]))
+    step = solve_bounded_step(problem, diverged, np.ones(2, bool), np.full(2, np.nan), np.zeros(2))
+    assert step.tolist() == [0.0, 0.0]
+
+
 @pytest.mark.parametrize("centre", [(1.0, -0.5), (8.0, 6.0), (0.0, 3.0)])
 def test_a_parabola_is_minimised_with_the_delays_freed_at_its_end(centre):
     reports = []

@@ -67,3 +67,12 @@ def test_without_cycles_the_floor_comes_from_high_frequencies_and_a_note_tells()
     diagnosis = diagnose([replace_channels(segments=())]).diagnosis
     assert diagnosis.verdict == "no_gap"
     assert any("high frequencies only" in note for note in diagnosis.notes)
+
+
+def test_singular_equations_are_reported_as_unusable_data(monkeypatch):
+    def fail(pool):
+        raise np.linalg.LinAlgError("Singular matrix")
+
+    monkeypatch.setattr("identification.gap.diagnosis.search_forward", fail)
+    with pytest.raises(UnusableDataError, match="do not determine a damper"):
+        diagnose([WHOLE])

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.fitting import EffectModel, Piece, Problem, SearchSpace, assemble
-from identification.gap.fits import FitOptions, fit_jointly, refit_all_samples
+from identification.fitting import EffectModel, Evaluation, Piece, Problem, SearchSpace, assemble
+from identification.gap.fits import FitOptions, fit_jointly, predict_joint_step, refit_all_samples
 from identification.gap.selection.screening import list_effect_models, screen
 from identification.pipeline import make_problem
 from identification.simulate import Excitation, SimulationModel, simulate
@@ -141,3 +141,11 @@ def test_a_slower_recording_is_decimated_less():
     both = replace(problem, pieces=(fast, fast.decimate(5)))
     assert [p.excitation.rate for p in both.decimate(4).pieces] == [125.0, 100.0]
     assert [p.excitation.rate for p in problem.decimate(4).pieces] == [125.0]
+
+
+def test_a_point_where_the_simulation_diverges_predicts_no_gain():
+    problem = simulate_problem("gas_spring")
+    diverged = Evaluation(np.inf, np.full((len(problem.free_mask),) * 2, np.nan), np.zeros(len(problem.free_mask)))
+    step, predicted = predict_joint_step(problem, diverged, np.zeros(len(problem.free_mask)))
+    assert not step.any()
+    assert predicted == np.inf

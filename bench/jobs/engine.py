@@ -16,7 +16,7 @@ from bench.jobs.dask_task import TOPIC, make_cancel_flag, run_dask_task
 from bench.jobs.errors import JobCancelledError, JobError
 from bench.jobs.job_spec import JobSpec, ResultSummary
 from bench.jobs.progress import JobProgress
-from bench.jobs.scheduler import HEARTBEAT_AGES, MAX_ATTEMPTS, describe_workers
+from bench.jobs.scheduler import MAX_ATTEMPTS, WORKER_STATES, describe_workers
 from bench.jobs.tls import SchedulerLocation
 
 _CONNECT_TIMEOUT = 10.0
@@ -27,7 +27,7 @@ _RELEASE_TIMEOUT = 10.0
 """Time [s] within which a cancelled job must have stopped."""
 _REPORT_PAUSE = 5.0
 """Time [s] before the end of a job is reported again, if the catalogue could not be written."""
-_STATE_LIFETIME = 1.0
+_STATE_LIFETIME = 0.5
 """Time [s] for which the state of the workers is kept, because each question goes to the scheduler."""
 _LOG = logging.getLogger(__name__)
 _CLIENT: Any = Client
@@ -144,7 +144,7 @@ class DaskEngine:
             raise JobError(f"job {job_id} has not stopped within {_RELEASE_TIMEOUT:g} s; try again later")
 
     async def describe_state(self) -> str:
-        """Return ``ok`` if all workers answer, otherwise what is missing; asked for at most once a second."""
+        """Return ``ok`` if all workers answer, otherwise what is missing; asked for at most twice a second."""
         if self._client is None:
             return f"no scheduler at {self._address}"
         async with self._asking:
@@ -155,10 +155,10 @@ class DaskEngine:
 
     async def _ask_for_workers(self, client: Any) -> str:
         try:
-            ages = await asyncio.wait_for(getattr(client.scheduler, HEARTBEAT_AGES)(), 1.0)
+            states = await asyncio.wait_for(getattr(client.scheduler, WORKER_STATES)(), 1.0)
         except (TimeoutError, OSError, ValueError):
             return f"the scheduler at {self._address} does not reply"
-        return describe_workers(ages)
+        return describe_workers(states)
 
     async def close(self) -> None:
         """Disconnect; the tasks continue on a scheduler that was not started here."""

@@ -4,10 +4,13 @@ import asyncio
 import contextlib
 import signal
 from collections.abc import AsyncIterator, Callable, Mapping
+from ipaddress import ip_address
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
+from urllib.parse import urlsplit
 
 import dask
+import psutil
 from distributed import Scheduler, SchedulerPlugin
 from distributed.metrics import time
 
@@ -27,8 +30,10 @@ A worker sends a heartbeat each 0.5 s. The commands of a job are processes of th
 Its own thread reads a log and holds the interpreter for parts of a second. The largest age measured was 1.9 s, at
 niceness 19 and with seven busy processes for each core.
 """
-HEARTBEAT_AGES = "mrbench_heartbeat_ages"
-"""Name of the request that `measure_heartbeat_ages` answers."""
+WORKER_STATES = "mrbench_worker_states"
+"""Name of the request that `measure_worker_states` answers."""
+_STOPPED = (psutil.STATUS_STOPPED, psutil.STATUS_TRACING_STOP)
+"""States of a process that executes nothing until it is continued."""
 WORKER_TTL = 30.0
 """Age [s] of the last heartbeat above which the scheduler gives the job of a worker to another one.
 
@@ -70,7 +75,7 @@ async def start_scheduler(
         scheduler = Scheduler(
             host=host, port=port, protocol="tls", security=security, dashboard_address=pages, dashboard=False
         )
-    scheduler.handlers[HEARTBEAT_AGES] = lambda: measure_heartbeat_ages(scheduler)
+    scheduler.handlers[WORKER_STATES] = lambda: measure_worker_states(scheduler)
     if on_silent_worker is not None:
         scheduler.add_plugin(SilentWorkerReport(on_silent_worker))
     try:
@@ -105,31 +110,62 @@ class SilentWorkerReport(SchedulerPlugin):
             self._on_silent(pid)
 
 
-def measure_heartbeat_ages(scheduler: Any) -> dict[str, float]:
-    """Return the time [s] since the last heartbeat of each worker, by its address.
+class WorkerState(TypedDict):
+    """State of a worker as the scheduler knows it and sends it to a client."""
 
-    The scheduler itself measures it, because its clock has stamped the heartbeats.
+    age: float
+    """Time since its last heartbeat [s]."""
+    suspended_pid: int
+    """Number of its process if the operating system has stopped it, else 0."""
+
+
+def measure_worker_states(scheduler: Any) -> dict[str, WorkerState]:
+    """Return the state of each worker, by its address.
+
+    The scheduler itself measures it, because its clock has stamped the heartbeats. It sees processes of its own
+    machine only.
     """
     now = time()
-    return {worker.address: now - worker.last_seen for worker in scheduler.workers.values()}
+    return {
+        worker.address: {
+            "age": now - worker.last_seen,
+            "suspended_pid": worker.pid if _is_suspended(worker.address, worker.pid) else 0,
+        }
+        for worker in scheduler.workers.values()
+    }
 
 
-def describe_workers(ages: Mapping[str, float]) -> str:
+def _is_suspended(address: str, pid: int) -> bool:
+    """Return True if the operating system has stopped a process; False if it runs on another machine."""
+    host = urlsplit(address).hostname or ""
+    try:
+        return ip_address(host).is_loopback and psutil.Process(pid).status() in _STOPPED
+    except (psutil.Error, ValueError):
+        return False
+
+
+def describe_workers(states: Mapping[str, WorkerState]) -> str:
     """Return ``ok``, or what is missing to execute jobs.
 
     Args:
-        ages: time since the last heartbeat of each worker [s], by its address.
+        states: state of each worker, by its address.
     """
-    silent = {address: age for address, age in ages.items() if age > HEARTBEAT_LIMIT}
-    if not ages:
+    suspended = {address: s["suspended_pid"] for address, s in states.items() if s["suspended_pid"]}
+    silent = {address: s["age"] for address, s in states.items() if s["age"] > HEARTBEAT_LIMIT}
+    moved = f"its job is given to another worker within {2 * WORKER_TTL:.0f} s"
+    if not states:
         return "no worker; start one: mrbench worker"
-    if not silent:
-        return "ok"
-    names = "the worker" if len(ages) == 1 else f"{len(silent)} of {len(ages)} workers ({', '.join(silent)})"
-    return (
-        f"no answer from {names} for {max(silent.values()):.0f} s, such as from a suspended process; "
-        f"its job is given to another worker within {2 * WORKER_TTL:.0f} s"
-    )
+    if suspended:
+        pids = " ".join(map(str, suspended.values()))
+        verb = "is" if len(suspended) == 1 else "are"
+        return f"{_name(suspended, states)} {verb} suspended; continue with: kill -CONT {pids}; else {moved}"
+    if silent:
+        return f"no answer from {_name(silent, states)} for {max(silent.values()):.0f} s; {moved}"
+    return "ok"
+
+
+def _name(some: Mapping[str, float], workers: Mapping[str, object]) -> str:
+    return "the worker" if len(workers) == 1 else f"{len(some)} of {len(workers)} workers ({', '.join(some)})"
 
 
 def run_scheduler(data: Path, host: str, port: int, print_line: Callable[[str], None]) -> None:

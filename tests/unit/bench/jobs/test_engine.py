@@ -7,7 +7,7 @@ import pytest
 
 from bench.catalogue import CatalogueUnavailableError
 from bench.jobs.engine import DaskEngine
-from bench.jobs.scheduler import HEARTBEAT_AGES
+from bench.jobs.scheduler import WORKER_STATES
 from bench.jobs.tls import SchedulerLocation
 
 PROGRESS = {"stage": "refine", "fraction": 0.4, "activity": "identify: refine"}
@@ -58,33 +58,33 @@ def test_progress_that_cannot_be_recorded_is_left_out(caplog):
 @pytest.mark.parametrize(
     ("answer", "words"),
     [
-        ({"tls://127.0.0.1:2": 0.4}, "ok"),
-        ({"tls://127.0.0.1:2": 40.0}, "no answer from the worker for 40 s"),
+        ({"tls://127.0.0.1:2": {"age": 0.4, "suspended_pid": 0}}, "ok"),
+        ({"tls://127.0.0.1:2": {"age": 40.0, "suspended_pid": 0}}, "no answer from the worker for 40 s"),
         (TimeoutError(), "the scheduler at tls://127.0.0.1:1 does not reply"),
     ],
 )
-def test_the_state_follows_the_heartbeats_of_the_workers(answer, words):
+def test_the_state_follows_the_workers(answer, words):
     async def ask():
         if isinstance(answer, Exception):
             raise answer
         return answer
 
     engine = make_engine(0)
-    engine._client.scheduler = SimpleNamespace(**{HEARTBEAT_AGES: ask})
+    engine._client.scheduler = SimpleNamespace(**{WORKER_STATES: ask})
     assert asyncio.run(engine.describe_state()).startswith(words)
 
 
-def test_the_scheduler_is_asked_once_a_second_at_most():
+def test_the_scheduler_is_asked_twice_a_second_at_most():
     asked = []
 
     async def ask():
         asked.append(True)
-        return {"tls://127.0.0.1:2": 0.0}
+        return {"tls://127.0.0.1:2": {"age": 0.0, "suspended_pid": 0}}
 
     async def ask_often():
         return await asyncio.gather(*(engine.describe_state() for _ in range(5)))
 
     engine = make_engine(0)
-    engine._client.scheduler = SimpleNamespace(**{HEARTBEAT_AGES: ask})
+    engine._client.scheduler = SimpleNamespace(**{WORKER_STATES: ask})
     assert asyncio.run(ask_often()) == ["ok"] * 5
     assert len(asked) == 1

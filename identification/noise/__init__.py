@@ -1,5 +1,6 @@
 """Noise of the recorded force: its floor, with an interval, from the recording alone."""
 
+from identification.noise.high_frequency import estimate_high_frequency_noise
 from identification.noise.noise_floor import NoiseFloorEstimate, estimate_floor
 from identification.noise.time_scales import (
     NO_SLOW_VARIANCE,
@@ -21,6 +22,7 @@ __all__ = [
     "WhiteningFilter",
     "design_whitening_filter",
     "estimate_floor",
+    "estimate_high_frequency_noise",
     "estimate_slow_variance",
     "list_scales",
     "measure_scale_variance",

@@ -63,7 +63,7 @@ _CHOSEN: dict[str, dict[str, tuple[float, ...]]] = {
     "force_filter": {"first_order": (0.003,)},
     "displacement_delay": {"pure_delay": (0.0017,)},
     "shear_thinning": {"proportional": (0.3, 0.08)},
-    "side_load_friction": {"linear": (2000.0, 0.001)},
+    "side_load_friction": {"linear": (2000.0, 0.001), "bristle": (2000.0, 0.001, 0.5, 0.015, 6e-5)},
     "coil_crosstalk": {"proportional": (20.0,)},
 }
 

@@ -69,10 +69,10 @@ def update_bristle_deflection(
 
 _SLIDING = Quantity("sliding", "N", 0.0, 1000.0, 20.0, "friction while sliding")
 _PEAK = Quantity("peak", "N", 0.0, 1000.0, 10.0, "additional friction while sticking")
-_PEAK_RATIO = Quantity("peak_ratio", "1", 0.0, 3.0, 0.3, "further friction while sticking, over the sliding one")
-_STRIBECK = Quantity("stribeck", "m/s", 5e-4, 0.2, 0.015, "velocity over which the peak falls")
-_PRESLIDING_DISTANCE = Quantity("presliding_distance", "m", 2e-6, 2e-3, 5e-5, "travel over which the lip deflects")
-_PARAMETERS = (_SLIDING, _PEAK, _STRIBECK)
+PEAK_RATIO = Quantity("peak_ratio", "1", 0.0, 3.0, 0.3, "further friction while sticking, over the sliding one")
+STRIBECK_SPEED = Quantity("stribeck", "m/s", 5e-4, 0.2, 0.015, "velocity over which the peak falls")
+PRESLIDING_DISTANCE = Quantity("presliding_distance", "m", 2e-6, 2e-3, 5e-5, "travel over which the lip deflects")
+_PARAMETERS = (_SLIDING, _PEAK, STRIBECK_SPEED)
 _STRIBECK_STARTS, _PRESLIDING_STARTS = (0.006, 0.02, 0.06), (3e-5, 2e-4)
 _STARTS = tuple((0.0, 0.0, speed) for speed in _STRIBECK_STARTS)
 
@@ -87,7 +87,7 @@ SEAL_FRICTION = Effect(
         Form(
             "presliding",
             "hysteretic_force",
-            (*_PARAMETERS, _PRESLIDING_DISTANCE),
+            (*_PARAMETERS, PRESLIDING_DISTANCE),
             tuple((*start, distance) for start in _STARTS for distance in _PRESLIDING_STARTS),
             compute_presliding_friction,
             update_lip_deflection,
@@ -95,7 +95,7 @@ SEAL_FRICTION = Effect(
         Form(
             "bristle",
             "hysteretic_force",
-            (_SLIDING, _PEAK_RATIO, _STRIBECK, _PRESLIDING_DISTANCE),
+            (_SLIDING, PEAK_RATIO, STRIBECK_SPEED, PRESLIDING_DISTANCE),
             tuple((0.0, 0.3, speed, distance) for speed in _STRIBECK_STARTS for distance in _PRESLIDING_STARTS),
             compute_bristle_friction,
             update_bristle_deflection,

@@ -23,7 +23,12 @@ from identification.gap.data import (
 from identification.gap.fits import NO_GAP_RATIO, Candidate
 from identification.gap.noise.input_noise import propagate_input_noise, resample_motion
 from identification.logs import Stretch
-from identification.noise import NORMAL_95, NoiseFloorEstimate, estimate_slow_variance
+from identification.noise import (
+    NORMAL_95,
+    NoiseFloorEstimate,
+    estimate_high_frequency_noise,
+    estimate_slow_variance,
+)
 
 _CHANCE_DEVIATIONS = 3.0
 """Standard deviations of a mean square that noise alone hardly exceeds: in one recording of 700."""
@@ -122,6 +127,25 @@ class NoiseModel:
         )
         errors = [e for e in found if e is not None and e.lowest > (NO_GAP_RATIO**2 - 1.0) * self.noise**2]
         return max(errors, key=lambda e: e.square, default=None)
+
+    def is_disproved_by(self, candidate: Candidate) -> bool:
+        """Return True if a set of effects leaves less than the floor of repeated cycles, by more than chance."""
+        if not candidate.names or self.estimate.deviation is None:
+            return False
+        lowest = self.noise - _CHANCE_DEVIATIONS * self.estimate.deviation
+        return max(candidate.train_rmse, candidate.held_out_rmse) < lowest
+
+    def discard_cycles(self, candidate: Candidate) -> None:
+        """Replace the floor of repeated cycles by the noise at high frequencies, where a set disproves it.
+
+        A spectral line that the set explains is no noise, so the smaller of force and residual counts.
+        """
+        residual = candidate.residual.values[candidate.residual.valid]
+        fast = min(estimate_high_frequency_noise(residual), self.estimate.high_frequency)
+        self.has_unsteady_cycles = True
+        self.estimate = replace(self.estimate, high_frequency=fast).discard_cycles(
+            "a model leaves less than what does not repeat with the cycles"
+        )
 
     def may_be_noise(self, candidate: Candidate, evaluation: EvaluationData) -> bool:
         """Return True if the estimate of the noise does not exclude that a whole residual is noise.

@@ -11,7 +11,7 @@ from identification.fitting import EffectModel
 from identification.gap.fits import Candidate
 from identification.gap.selection.candidate_pool import CandidatePool
 from identification.gap.selection.neighbours import fit_extension
-from identification.gap.selection.screening import ScreeningResult
+from identification.gap.selection.screening import ScreeningResult, compute_expected_gain
 
 
 def is_mounting_promising(pool: CandidatePool, parent: Candidate, name: str) -> bool:
@@ -38,17 +38,19 @@ def _fit_forms(pool: CandidatePool, parent: Candidate, gains: Sequence[Screening
     """
     settings = pool.settings
     simpler: dict[str, float] = {}
+    is_helpful = True
     for gain in gains:
         if parent.names and gain.effect_model.form.action == "displacement_backlash":
             continue  # Its contacts need a high rate, and a free pin shows together with other effects as well.
         if pool.is_at_floor(pool.find_best()) or pool.compute_excess(parent) < settings.mounting_excess:
             return
+        if not is_helpful and compute_expected_gain(gain) < 1.0 - settings.richer_form_share:
+            continue
         values = [*_make_starts(simpler, gain.effect_model), *gain.effect_model.starts]
         extended = fit_extension(pool, parent, gain, values)
         simpler = extended.fit.values[gain.effect_model.name]
-        share = settings.richer_form_share
-        if parent.names and pool.compute_excess(extended) > share * pool.compute_excess(parent):
-            return
+        remaining = pool.compute_excess(extended) / pool.compute_excess(parent)
+        is_helpful = not parent.names or remaining < settings.richer_form_share
 
 
 def _make_starts(simpler: Mapping[str, float], model: EffectModel) -> list[tuple[float, ...]]:

@@ -17,17 +17,20 @@ from identification.gap.noise import (
 )
 from identification.gap.selection.candidate_pool import CandidatePool
 from identification.gap.selection.exchange import exchange_effects, exchange_mounting, fit_subsets
-from identification.gap.selection.extension import try_extension
+from identification.gap.selection.extension import (
+    check_effects,
+    is_dominant,
+    is_extension_promising,
+    try_extension,
+)
 from identification.gap.selection.mounting import fit_mounting, is_mounting_promising
-from identification.gap.selection.neighbours import find_subset, fit_extension
+from identification.gap.selection.neighbours import fit_extension
 from identification.gap.selection.posterior import (
     MAX_TIED_SETS,
     MIN_TIED_PROBABILITY,
     UNKNOWN_THRESHOLD,
     BlockEvidence,
     Posterior,
-    compute_complexity_penalty,
-    compute_log_prior,
 )
 from identification.gap.selection.screening import (
     MOUNTING_EFFECTS,
@@ -35,7 +38,6 @@ from identification.gap.selection.screening import (
     list_effect_models,
     select_best_forms,
     select_shortlist,
-    select_unpredicted,
 )
 
 _CONTACT_ACTIONS = ("connection", "displacement_backlash")
@@ -55,10 +57,12 @@ def search_forward(pool: CandidatePool) -> None:
         return
     beam = [baseline]
     for size, count in enumerate(pool.settings.shortlist_sizes, 1):
-        if pool.budget_spent or pool.is_at_floor(beam[0]):
+        if pool.budget_spent or _is_explained(pool, beam[0]):
             break
         for parent in beam:
             _fit_extensions(pool, parent, count)
+        if size == 1 and not _closes_enough(pool, pool.find_best(), beam[0]):
+            _fit_other_effects(pool)
         _search_best_sets(pool, size)
         _refit_law(pool)
         sets = _sort_sets(pool, size)
@@ -135,6 +139,32 @@ def _is_noise(pool: CandidatePool, baseline: Candidate) -> bool:
     return pool.is_at_floor(baseline)
 
 
+def _is_explained(pool: CandidatePool, best: Candidate) -> bool:
+    """Return True if the forward search ends because a set is at the noise floor.
+
+    What such a set leaves of a large gap may still contain an effect that a linear step finds. It is fitted before
+    the floor can be taken from the residual without it.
+    """
+    if not pool.is_at_floor(best) or _discard_disproved_floor(pool, best):
+        return False
+    for gain in pool.screen(best, best.names)[:1] if is_extension_promising(pool, best.names) else ():
+        if is_dominant(pool, gain):
+            fit_extension(pool, best, gain)
+    return True
+
+
+def _discard_disproved_floor(pool: CandidatePool, best: Candidate) -> bool:
+    """Discard the noise floor of repeated cycles if a set leaves significantly less; return True if so.
+
+    Cycles count all that does not repeat with them as noise, so a missing effect may be a part of their floor.
+    """
+    if not pool.noise_model.is_disproved_by(best):
+        return False
+    pool.noise_model.discard_cycles(best)
+    pool.notes.append(f"the noise floor is that at {pool.noise_model.estimate.basis}")
+    return not pool.is_at_floor(best)
+
+
 def _fit_certain_effects(pool: CandidatePool) -> bool:
     """Fit the effects that noise cannot imitate, with the law inside a wide interval of the floor; True if any.
 
@@ -183,9 +213,27 @@ def _is_explained_by_clocks(pool: CandidatePool) -> bool:
 
 def _is_worth_extending(pool: CandidatePool, best: Candidate, parent: Candidate) -> bool:
     """Return True if a set closes enough of its parent's excess; with a large gap, one effect may close little."""
-    excess = pool.compute_excess(best)
-    closes = excess < pool.settings.extension_share * pool.compute_excess(parent)
-    return closes or (not parent.names and excess > pool.settings.large_excess)
+    return _closes_enough(pool, best, parent) or (
+        not parent.names and pool.compute_excess(best) > pool.settings.large_excess
+    )
+
+
+def _closes_enough(pool: CandidatePool, best: Candidate, parent: Candidate) -> bool:
+    """Return True if a set closes enough of its parent's excess to grow from there."""
+    return pool.compute_excess(best) < pool.settings.extension_share * pool.compute_excess(parent)
+
+
+def _fit_other_effects(pool: CandidatePool) -> None:
+    """Fit every effect alone that was not on the shortlist, each in its best form.
+
+    A certain error of the law has a cause, even where no linear step finds it. The law may have taken over what
+    the effect does, or the effect has no zero size. An effect whose starts all diverge is left out.
+    """
+    for gain in select_best_forms(pool.screen(pool.baseline, frozenset())):
+        if pool.budget_spent or compute_expected_gain(gain) == -np.inf:
+            return
+        if frozenset({gain.effect_model.name}) not in pool.candidates:
+            fit_extension(pool, pool.baseline, gain)
 
 
 def _fit_extensions(pool: CandidatePool, parent: Candidate, count: int) -> None:
@@ -196,11 +244,7 @@ def _fit_extensions(pool: CandidatePool, parent: Candidate, count: int) -> None:
         count = settings.large_shortlist
     if excess < settings.small_excess and compute_expected_gain(gains[0]) < settings.small_excess_gain:
         return
-    shortlist = select_shortlist(gains, count)
-    if not shortlist and not parent.names:
-        # A certain error of the law has a cause, even where no linear step finds it.
-        shortlist = select_unpredicted(gains, count)
-    for gain in shortlist:
+    for gain in select_shortlist(gains, count):
         if pool.budget_spent:
             return
         fit_extension(pool, parent, gain)
@@ -219,43 +263,8 @@ def compute_final_posterior(pool: CandidatePool) -> Posterior:
         most_probable = pool.compute_posterior().most_probable_set
         pool.fit_fully(most_probable)
     exchange_mounting(pool, most_probable)
-    _check_effects(pool)
+    check_effects(pool)
     return pool.compute_posterior()
-
-
-def _check_effects(pool: CandidatePool) -> None:
-    """Compute what each effect of the most probable set gains on held-out samples, until that set stays the same.
-
-    An effect that only absorbs the form error of another gains on the fitted samples, and hardly on others, or it
-    closes a small part of what the other leaves.
-    """
-    for _ in range(pool.settings.max_refits):
-        names = pool.compute_posterior().most_probable_set
-        if len(names) < 2 or names in pool.held_out_evidence:
-            return
-        pool.fit_fully(names)
-        candidate = pool.candidates[names]
-        subsets = [find_subset(pool, candidate, model) for model in candidate.fit.effects]
-        pool.held_out_evidence[names] = tuple(_compare_with_subset(pool, subset, candidate) for subset in subsets)
-
-
-def _compare_with_subset(pool: CandidatePool, subset: Candidate, candidate: Candidate) -> BlockEvidence:
-    """Return the evidence on held-out samples for a set over one with an effect less.
-
-    Where the effect hardly acts on them, they cannot judge it, and the evidence on all samples counts: transients
-    after rare steps of the drive may all be fitted. An effect that closes too little of what the others leave only
-    repairs their form. Its set is then less probable than the one without it, by the penalty for one more effect.
-    The evidence is at most the likelihood ratio in noise of the residual's spectrum, less the prior odds.
-    """
-    comparison, penalty = pool.comparison, compute_complexity_penalty(subset.names)
-    evidence = comparison.compute_held_out_evidence(subset, candidate)
-    if comparison.expect_held_out_evidence(subset, candidate) < penalty:
-        evidence = comparison.compute_evidence(subset, candidate)
-    if comparison.compute_closed_share(subset, candidate) < pool.settings.min_closed_share:
-        evidence = min(evidence, -penalty)
-    required = compute_log_prior(subset.names) - compute_log_prior(candidate.names)
-    evidence = min(evidence, comparison.compute_noise_evidence(subset, candidate) - required)
-    return BlockEvidence(subset.names, evidence)
 
 
 def _fit_probable_sets(pool: CandidatePool) -> None:

@@ -105,15 +105,6 @@ def select_shortlist(gains: Sequence[ScreeningResult], count: int) -> list[Scree
     ]
 
 
-def select_unpredicted(gains: Sequence[ScreeningResult], count: int) -> list[ScreeningResult]:
-    """Return effects for which the linear step predicts a loss in every form, each in its best form.
-
-    Such an effect has no zero size. It is linearised at a size that the recording does not have, which says
-    nothing about its gain. An effect whose starts all diverge cannot be fitted, and is left out.
-    """
-    return [g for g in select_best_forms(gains) if -np.inf < compute_expected_gain(g) < 0.0][:count]
-
-
 def select_best_forms(gains: Sequence[ScreeningResult]) -> list[ScreeningResult]:
     """Return each effect in its best form, in the order of the gains."""
     best: dict[str, ScreeningResult] = {}

@@ -85,6 +85,7 @@ CASES = [
     ("shear_thinning", "proportional", (0.0, -0.08, 0.3, 0.08), (1.0, 0.85, 1.0)),
     ("side_load_friction", "linear", (0.011, 1e-3, 2000.0, 0.001), 20.0 / ROOT2),
     ("side_load_friction", "linear", (-0.009, -1e-3, 2000.0, 0.001), -20.0 / ROOT2),
+    ("side_load_friction", "bristle", (-0.009, 0.015, 0.5, 2000.0, 0.001, 0.5, 0.015, 6e-5), 10.0),
 ]
 MEMORY = [
     ("magnetic_remanence", "exponential", (0.2, 0.1, 1.0, 0.02, 0.1, 1.0), -1.0 + 1.2 * E1),
@@ -101,6 +102,8 @@ MEMORY = [
     ("seal_friction", "presliding", (0.2, -6e-5, 0.1, 20.0, 10.0, 0.015, 6e-5), -1.0 + 1.2 * E1),
     ("seal_friction", "bristle", (0.2, 9e-5, 0.0, 20.0, 0.5, 0.015, 6e-5), 1.5 - 1.3 * E1),
     ("seal_friction", "bristle", (0.2, -6e-5, -1.0, 20.0, 0.5, 0.015, 6e-5), -1.0 + 1.2 * E1),
+    ("side_load_friction", "bristle", (0.2, 9e-5, 0.0, 2000.0, 0.001, 0.5, 0.015, 6e-5), 1.5 - 1.3 * E1),
+    ("side_load_friction", "bristle", (0.2, -6e-5, -1.0, 2000.0, 0.001, 0.5, 0.015, 6e-5), -1.0 + 1.2 * E1),
 ]
 
 
@@ -200,7 +203,9 @@ SCALES = {
     "seal_friction": {
         "sliding": 20, "peak": 10, "peak_ratio": 0.3, "stribeck": 0.015, "presliding_distance": 5e-5,
     },
-    "side_load_friction": {"growth": 1000, "middle": 0.005},
+    "side_load_friction": {
+        "growth": 1000, "middle": 0.005, "peak_ratio": 0.3, "stribeck": 0.015, "presliding_distance": 5e-5,
+    },
     "viscous_heating": {"softening": 2e-4, "recovery_time": 100, "yield_exponent": 0.5},
 }  # fmt: skip
 """Usual magnitude of the parameters of some effects, in SI units."""

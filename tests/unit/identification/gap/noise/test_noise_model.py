@@ -73,6 +73,27 @@ def test_the_noise_lies_between_white_noise_and_the_residual(pool, estimate, rem
     assert model.estimate_noise(candidate) == pytest.approx(noise)
 
 
+@pytest.mark.parametrize(
+    ("remaining", "deviation", "disproved"), [(2.6, 0.1, True), (2.8, 0.1, False), (1.0, None, False)]
+)
+def test_a_set_disproves_a_floor_that_is_above_its_error_by_more_than_chance(
+    pool, remaining, deviation, disproved
+):
+    model = NoiseModel(NoiseFloorEstimate(3.0, 3.0, 2.0, "coloured", deviation), ())
+    found = replace(pool.candidates[BACKLASH], train_rmse=remaining, held_out_rmse=remaining)
+    assert model.is_disproved_by(found) is disproved
+    assert not model.is_disproved_by(replace(pool.baseline, train_rmse=remaining, held_out_rmse=remaining))
+
+
+@pytest.mark.parametrize(("recorded", "floor"), [(1.5, 1.5), (9.0, NOISE)])
+def test_a_disproved_floor_becomes_the_noise_at_high_frequencies_without_lines(pool, recorded, floor):
+    model = NoiseModel(NoiseFloorEstimate(12.0, 12.0, recorded, "coloured", 0.1), ())
+    model.discard_cycles(pool.candidates[BACKLASH])
+    assert model.floor == pytest.approx(floor, rel=0.1)
+    assert model.has_unsteady_cycles
+    assert model.estimate.deviation is None
+
+
 def test_the_highest_floor_is_the_upper_end_of_the_interval_with_the_input_noise():
     known = NoiseModel(NoiseFloorEstimate(3.0, 3.0, 2.0, "coloured", 0.1), ())
     assert known.highest_floor == pytest.approx(3.196)

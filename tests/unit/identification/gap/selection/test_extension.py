@@ -1,5 +1,7 @@
 """One effect more is added to the most probable set if it closes enough, and its block evidence pays for it."""
 
+from dataclasses import replace
+
 import pytest
 
 from identification.damper.effects import EFFECTS
@@ -43,12 +45,31 @@ def test_an_effect_that_closes_little_has_no_evidence(pool):
     assert max(others) < 1.0
 
 
-def test_confusable_effects_are_not_fitted(pool):
+def test_confusable_effects_are_not_fitted_where_a_small_gain_is_expected(pool):
     pool = pool.copy(extension_effects=100)
     try_extension(pool, GAS)
     fitted = {model.name for effects in pool.fitted for model in effects}
     assert "seal_friction" in fitted
     assert not fitted & {"end_stop", "side_load_friction", "displacement_nonlinearity"}
+
+
+def test_a_confusable_effect_is_fitted_where_a_large_gain_is_expected(pool, monkeypatch):
+    pool = pool.copy()
+    gains = [g for g in pool.screen(pool.candidates[GAS], GAS) if g.effect_model.name == "side_load_friction"]
+    gain = replace(gains[0], predicted_gain=0.41, achieved_gain=0.41)
+    monkeypatch.setattr(pool, "screen", lambda parent, without: [gain])
+    try_extension(pool, GAS)
+    assert [model.name for model in pool.fitted[0]] == ["gas_spring", "side_load_friction"]
+
+
+@pytest.mark.parametrize(("share", "fitted"), [(1e9, True), (-1e9, False)])
+def test_a_single_effect_is_fitted_from_the_side_of_a_confusable_one_that_closes_a_part(pool, share, fitted):
+    pool = pool.copy(extension_effects=0, helpful_mounting_share=share)
+    pool.extend("end_stop")
+    pool.fitted.clear()
+    try_extension(pool, GAS)
+    pairs = [[model.name for model in effects] for effects in pool.fitted]
+    assert (["end_stop", "gas_spring"] in pairs) is fitted
 
 
 def test_a_confusable_effect_that_the_search_has_fitted_pays_a_penalty(pool):

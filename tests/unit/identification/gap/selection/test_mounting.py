@@ -1,5 +1,7 @@
 """Backlash and compliance are fitted form by form: alone all, with others while each closes part of the gap."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -46,6 +48,23 @@ def test_alone_every_form_is_fitted_even_where_the_simplest_closes_nothing(pin):
 def test_with_other_effects_no_richer_form_is_fitted_where_the_simplest_closes_too_little(pin):
     pool = pin.copy(richer_form_share=0.0)
     assert fit_forms(pool, "fixture_compliance", frozenset({"gas_spring"})) == ["linear"]
+
+
+@pytest.mark.parametrize(
+    ("gain", "forms"), [(0.21, ["linear", "stiffening", "closing_joint"]), (0.19, ["linear"])]
+)
+def test_a_richer_form_is_fitted_if_it_is_expected_to_close_what_the_simplest_does_not(pin, gain, forms):
+    pool, parent = pin.copy(), frozenset({"gas_spring"})
+    found = [
+        g for g in pool.screen(pool.candidates[parent], parent) if g.effect_model.name == "fixture_compliance"
+    ]
+    stated = {"stiffening": gain}
+    gains = [
+        replace(g, predicted_gain=(value := stated.get(g.effect_model.form_name, 0.0)), achieved_gain=value)
+        for g in found
+    ]
+    fit_mounting(pool, pool.candidates[parent], gains, "fixture_compliance")
+    assert [effects[-1].form_name for effects in pool.fitted] == forms
 
 
 def test_every_action_of_backlash_is_tried_alone(pin):

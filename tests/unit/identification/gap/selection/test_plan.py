@@ -10,9 +10,11 @@ from identification.damper.effects import EFFECTS
 from identification.fitting import EffectModel
 from identification.gap.fits import fit_jointly
 from identification.gap.noise import NoiseModel
+from identification.gap.selection import plan
+from identification.gap.selection.extension import compare_with_subset
 from identification.gap.selection.neighbours import fit_extension
 from identification.gap.selection.plan import (
-    _compare_with_subset,
+    _is_explained,
     _is_gap_negligible,
     _refit_law,
     _search_best_sets,
@@ -89,17 +91,45 @@ def state_gains(pool, monkeypatch, stated):
     return pool
 
 
-@pytest.mark.parametrize(("gain", "found"), [(-0.1, True), (0.001, False)])
-def test_an_effect_whose_linear_step_fails_is_fitted_where_no_other_promises_a_gain(monkeypatch, gain, found):
+@pytest.mark.parametrize(("gain", "found"), [(-0.1, True), (0.001, True), (-np.inf, False)])
+def test_an_effect_without_a_predicted_gain_is_fitted_where_no_other_closes_enough(monkeypatch, gain, found):
     pool = state_gains(make_pool("gas_spring"), monkeypatch, {"gas_spring": gain})
     search_forward(pool)
     assert (frozenset({"gas_spring"}) in pool.candidates) is found
 
 
-def test_an_effect_whose_linear_step_fails_is_not_fitted_beside_one_that_promises_a_gain(monkeypatch):
+def test_an_effect_without_a_predicted_gain_is_not_fitted_beside_one_that_closes_enough(monkeypatch):
     pool = state_gains(make_pool("gas_spring"), monkeypatch, {"gas_spring": 0.9, "field_saturation": -0.1})
     search_forward(pool)
     assert frozenset({"field_saturation"}) not in pool.candidates
+
+
+@pytest.mark.parametrize(
+    ("gain", "promising", "fitted"), [(0.41, True, True), (0.39, True, False), (0.41, False, False)]
+)
+def test_beside_a_set_at_the_floor_an_effect_is_fitted_if_it_is_expected_to_close_much(
+    monkeypatch, gain, promising, fitted
+):
+    pool = make_pool("gas_spring")
+    pool.fit_law()
+    pool.extend("gas_spring")
+    single = replace(pool.candidates[frozenset({"gas_spring"})], train_rmse=pool.floor, held_out_rmse=pool.floor)
+    monkeypatch.setattr(plan, "is_extension_promising", lambda pool, names: promising)
+    assert _is_explained(state_gains(pool, monkeypatch, {"coil_lag": gain}), single)
+    assert (frozenset({"gas_spring", "coil_lag"}) in pool.candidates) is fitted
+
+
+def test_a_set_below_the_interval_of_the_floor_disproves_it_and_the_search_goes_on():
+    pool = make_pool("gas_spring", "moving_mass")
+    pool.fit_law()
+    pool.extend("gas_spring")
+    single = pool.candidates[frozenset({"gas_spring"})]
+    high = 2.0 * single.train_rmse
+    pool.noise_model.estimate = replace(pool.noise_model.estimate, noise=high, deviation=0.1 * high, scales=())
+    assert pool.is_at_floor(single)
+    assert not _is_explained(pool, single)
+    assert pool.floor == pytest.approx(NOISE, rel=0.1)
+    assert "leaves less than what does not repeat" in pool.notes[0]
 
 
 def make_uncertain_pool(*effects):
@@ -170,15 +200,13 @@ def make_comparing_pool(held_out, expected, on_all, closed, in_noise=100.0):
 @pytest.mark.parametrize(("expected", "found"), [(0.5, 12.0), (20.0, -0.5)])
 def test_held_out_samples_do_not_judge_an_effect_that_hardly_acts_on_them(expected, found):
     subset, candidate = (SimpleNamespace(names=frozenset(names)) for names in (["gas_spring"], BOTH))
-    assert (
-        _compare_with_subset(make_comparing_pool(-0.5, expected, 12.0, 0.9), subset, candidate).log_odds == found
-    )
+    assert compare_with_subset(make_comparing_pool(-0.5, expected, 12.0, 0.9), subset, candidate).log_odds == found
 
 
 @pytest.mark.parametrize(("closed", "kept"), [(0.39, False), (0.41, True)])
 def test_an_effect_that_closes_little_of_what_the_others_leave_repairs_their_form(closed, kept):
     subset, candidate = (SimpleNamespace(names=frozenset(names)) for names in (["gas_spring"], BOTH))
-    parent, log_odds = _compare_with_subset(make_comparing_pool(9.0, 9.0, 9.0, closed), subset, candidate)
+    parent, log_odds = compare_with_subset(make_comparing_pool(9.0, 9.0, 9.0, closed), subset, candidate)
     assert parent == subset.names
     assert log_odds == (9.0 if kept else -compute_complexity_penalty(subset.names))
     assert log_odds > 0.0 or not kept
@@ -189,7 +217,7 @@ def test_noise_of_the_residuals_spectrum_bounds_the_evidence_of_an_effect(excess
     subset, candidate = (SimpleNamespace(names=frozenset(names)) for names in (["gas_spring"], BOTH))
     in_noise = compute_complexity_penalty(subset.names) + excess
     pool = make_comparing_pool(9.0, 9.0, 9.0, 0.9, in_noise)
-    assert _compare_with_subset(pool, subset, candidate).log_odds == pytest.approx(excess)
+    assert compare_with_subset(pool, subset, candidate).log_odds == pytest.approx(excess)
 
 
 def test_a_law_in_a_wrong_minimum_is_fitted_again_from_the_law_of_the_best_set():

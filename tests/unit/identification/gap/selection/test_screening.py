@@ -13,7 +13,6 @@ from identification.gap.selection.screening import (
     _make_difference_step,
     list_effect_models,
     select_shortlist,
-    select_unpredicted,
 )
 
 
@@ -40,11 +39,6 @@ def test_a_gain_of_two_per_cent_is_too_small(gain, listed):
 def test_a_further_form_is_listed_if_it_gains_nearly_as_much(second, forms):
     gains = [make_gain("gas_spring", 0.5, form=1), make_gain("gas_spring", second, form=0)]
     assert len(name_shortlist(gains)) == forms
-
-
-def test_an_effect_that_diverges_from_every_start_is_not_tried():
-    gains = [make_gain("end_stop", -0.2, -0.1), make_gain("moving_mass", -np.inf, -np.inf)]
-    assert [g.effect_model.name for g in select_unpredicted(gains, 5)] == ["end_stop"]
 
 
 def make_linearisation(cost, samples):

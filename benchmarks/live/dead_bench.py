@@ -1,9 +1,10 @@
-"""Delay until the page shows that agent or service no longer answers.
+"""Delay until the page shows that agent, service or worker no longer answers.
 
 python -m benchmarks dead_bench
 
 A process is suspended (SIGSTOP) at random moments, at rest and during a run. That is harder to notice than its
-end, because its connections stay open. The delay counts until the page in Chromium shows `No connection`.
+end, because its connections stay open. The delay counts until the page in Chromium shows `No connection`, or that
+the worker is not ready.
 """
 
 import json
@@ -31,31 +32,32 @@ SEED, REPEATS, LONGEST = 21, 10, 60.0
 HOLD = 3.0
 """Time for which a process stays suspended after the page has noticed it [s]."""
 METHOD = "paper_sines"
-LOST = "No connection"
+LOST, READY, NOT_READY = "No connection", "worker ready", "worker not ready"
 
 
 class StateWatch:
-    """States that the page shows, with the UTC at which each appeared."""
+    """States of bench and worker that the page shows, with the UTC at which each appeared."""
 
     def __init__(self, process: "subprocess.Popen[str]") -> None:
         """Read the output of `watch_state.mjs`."""
-        self.seen: list[tuple[float, str]] = []
+        self.seen: list[tuple[float, set[str]]] = []
         self._process = process
         threading.Thread(target=self._read, daemon=True).start()
 
     def _read(self) -> None:
         for line in self._process.stdout or ():
             change = json.loads(line)
-            self.seen.append((change["utc_s"], change["word"]))
+            worker = READY if change["health"].get("Worker") == "ready" else NOT_READY
+            self.seen.append((change["utc_s"], {change["word"], worker}))
 
     def wait_for(self, *words: str) -> float:
-        """Return the UTC [s] at which the present state appeared, as soon as it is one of these.
+        """Return the UTC [s] at which the present state appeared, as soon as it has one of these words.
 
         Raises:
             TimeoutError: none of them appears.
         """
         end = time.monotonic() + LONGEST
-        while not self.seen or self.seen[-1][1] not in words:
+        while not self.seen or not self.seen[-1][1].intersection(words):
             if time.monotonic() > end:
                 raise TimeoutError(f"{words} not shown within {LONGEST:g} s; seen {self.seen[-3:]}")
             time.sleep(0.01)
@@ -67,13 +69,15 @@ class StateWatch:
 
 
 def run() -> None:
-    """Print the delays of agent and service, at rest and during a run."""
-    print(f"Dead bench: time until the page shows {LOST!r}, {REPEATS} random moments each")
+    """Print the delays of worker, agent and service, at rest and during a run."""
+    print(f"Dead bench: time until the page shows {LOST!r} or {NOT_READY!r}, {REPEATS} random moments each")
     draw = random.Random(SEED)
     with TemporaryDirectory() as path, start_processes(DemoFolder(Path(path), METHOD, None, 1)) as address:
         watch = StateWatch(start_script(WATCH_STATE, address))
         try:
             watch.wait_for("Idle")
+            at_rest = measure(watch, "worker", draw, lambda: watch.wait_for(READY), NOT_READY)
+            _print_delays("worker at rest", at_rest)
             for name, word in (("rig", "agent"), ("serve", "service")):
                 _print_delays(f"{word} at rest", measure(watch, name, draw, lambda: watch.wait_for("Idle")))
             for name, word in (("serve", "service"), ("rig", "agent")):
@@ -82,8 +86,10 @@ def run() -> None:
             watch.close()
 
 
-def measure(watch: StateWatch, name: str, draw: random.Random, prepare: Callable[[], object]) -> list[float]:
-    """Return the delay [s] of each repeat; `prepare` brings the bench into the wanted state."""
+def measure(
+    watch: StateWatch, name: str, draw: random.Random, prepare: Callable[[], object], lost: str = LOST
+) -> list[float]:
+    """Return the delay [s] until a word is shown, for each repeat; `prepare` brings the bench into its state."""
     delays = []
     for _ in range(REPEATS):
         prepare()
@@ -92,7 +98,7 @@ def measure(watch: StateWatch, name: str, draw: random.Random, prepare: Callable
         began = time.time()
         process.send_signal(signal.SIGSTOP)
         try:
-            delays.append(watch.wait_for(LOST) - began)
+            delays.append(watch.wait_for(lost) - began)
             time.sleep(HOLD)
         finally:
             process.send_signal(signal.SIGCONT)
@@ -104,10 +110,10 @@ def _start_run(watch: StateWatch, address: str) -> None:
     """Bring the bench into a run; the suspension of the agent trips the drive, which needs a reset."""
     base, token = address.split("#token=")
     watch.wait_for("Idle", "Running", "Tripped")
-    word = watch.seen[-1][1]
-    if word == "Running":
+    words = watch.seen[-1][1]
+    if "Running" in words:
         return
-    if word == "Tripped":
+    if "Tripped" in words:
         headers = {"Authorization": f"Bearer {token}"}
         httpx2.post(f"{base}api/v1/bench/reset", headers=headers).raise_for_status()
         watch.wait_for("Idle")

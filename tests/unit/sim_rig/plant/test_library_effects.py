@@ -21,6 +21,7 @@ TOLERANCE = {
     "coil_lag": 0.25,  # the rig interpolates the dead time between its substeps
     "clevis_backlash": 0.5,  # contacts begin and end within a sample
     "seal_friction": 0.1,  # a lip ignores a small part of its presliding distance
+    "side_load_friction": 0.1,  # its guide does so, too
     "force_filter": 0.6,  # the force is taken as linear between samples
 }
 """[N] rms tolerance of effects that need more than the usual one."""

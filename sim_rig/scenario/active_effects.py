@@ -15,8 +15,8 @@ def check_effects(effects: Sequence[ActiveEffect]) -> tuple[ActiveEffect, ...]:
     """Return the effects with their definitions and the present names of their forms and parameters.
 
     Raises:
-        ValueError: an effect, its form or a parameter does not exist, a value is out of bounds, or an effect is
-            listed twice.
+        ValueError: an effect, its form or a parameter does not exist, a value is out of bounds, an effect is
+            listed twice, or two have a friction with deflection.
     """
     complete = tuple(_use_present_names(_find_definition(effect)) for effect in effects)
     for effect in complete:
@@ -24,6 +24,13 @@ def check_effects(effects: Sequence[ActiveEffect]) -> tuple[ActiveEffect, ...]:
     names = [effect.name for effect in complete]
     if len(set(names)) < len(names):
         raise ValueError(f"an effect is listed twice among {_join_names(names)}; merge its entries")
+    # The rig integrates one deflection, which both would share.
+    deflecting = [e.name for e in complete if e.effect.find_form(e.form).action == "hysteretic_force"]
+    if len(deflecting) > 1:
+        raise ValueError(
+            f"{_join_names(deflecting)} have a friction with deflection each, at most one may; give the other "
+            "one a form without"
+        )
     return complete
 
 

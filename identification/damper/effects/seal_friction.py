@@ -52,16 +52,12 @@ def compute_bristle_friction(
     return sliding * deflection
 
 
-def update_bristle_deflection(
-    deflection: Any,
-    change: Any,
-    velocity: Any,
-    sliding: Any,
-    peak_ratio: Any,
-    stribeck: Any,
-    presliding_distance: Any,
-) -> Any:
-    """Return the relative deflection [1] of bristles after a change of displacement [m] at a velocity [m/s]."""
+def update_bristle_deflection(deflection: Any, change: Any, velocity: Any, *parameters: Any) -> Any:
+    """Return the relative deflection [1] of bristles after a change of displacement [m] at a velocity [m/s].
+
+    The last three parameters are peak ratio, Stribeck speed and presliding distance.
+    """
+    peak_ratio, stribeck, presliding_distance = parameters[-3:]
     limit = 1.0 + peak_ratio * np.exp(-((velocity / stribeck) ** 2))
     target = limit if change > 0.0 else -limit
     return target + (deflection - target) * np.exp(-abs(change) / (presliding_distance * limit))

@@ -9,7 +9,12 @@ from typing import Any
 import numpy as np
 
 from identification.damper.effects.effect import Effect, Form
-from identification.damper.effects.seal_friction import PEAK_RATIO, PRESLIDING_DISTANCE, STRIBECK_SPEED
+from identification.damper.effects.seal_friction import (
+    PEAK_RATIO,
+    PRESLIDING_DISTANCE,
+    STRIBECK_SPEED,
+    update_bristle_deflection,
+)
 from identification.damper.parameters import Quantity
 
 CREEP_SPEED = 1e-3
@@ -36,22 +41,6 @@ def compute_bristle_side_friction(
     return growth * np.abs(x - middle) * deflection
 
 
-def update_guide_deflection(
-    deflection: Any,
-    change: Any,
-    velocity: Any,
-    growth: Any,
-    middle: Any,
-    peak_ratio: Any,
-    stribeck: Any,
-    presliding_distance: Any,
-) -> Any:
-    """Return the relative deflection [1] of the guide after a change of displacement [m] at a velocity [m/s]."""
-    limit = 1.0 + peak_ratio * np.exp(-((velocity / stribeck) ** 2))
-    target = limit if change > 0.0 else -limit
-    return target + (deflection - target) * np.exp(-abs(change) / (presliding_distance * limit))
-
-
 _GROWTH = Quantity("growth", "N/m", 0.0, 1e5, 1000.0, "growth of the friction with the stroke")
 _MIDDLE = Quantity("middle", "m", -0.1, 0.1, 5e-3, "displacement without side load")
 _MIDDLES = (0.0, -0.01, 0.01)
@@ -75,7 +64,7 @@ SIDE_LOAD_FRICTION = Effect(
             (_GROWTH, _MIDDLE, PEAK_RATIO, STRIBECK_SPEED, PRESLIDING_DISTANCE),
             tuple((0.0, middle, 0.3, 0.006, 3e-5) for middle in _MIDDLES),
             compute_bristle_side_friction,
-            update_guide_deflection,
+            update_bristle_deflection,
         ),
     ),
 )

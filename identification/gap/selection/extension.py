@@ -13,6 +13,7 @@ from collections.abc import Collection
 from identification.gap.fits import Candidate
 from identification.gap.noise import ResidualRegression, take_floor_from_residual
 from identification.gap.selection.candidate_pool import CandidatePool
+from identification.gap.selection.mounting import closes_part
 from identification.gap.selection.neighbours import find_subset, fit_extension
 from identification.gap.selection.posterior import BlockEvidence, compute_complexity_penalty, compute_log_prior
 from identification.gap.selection.screening import ScreeningResult, compute_expected_gain, select_shortlist
@@ -68,19 +69,14 @@ def _fit_confusable_pairs(pool: CandidatePool, names: frozenset[str], partners: 
     (model,) = pool.candidates[names].fit.effects
     values = pool.candidates[names].fit.active_effects[0].values
     for other in (pool.candidates.get(frozenset({partner})) for partner in sorted(partners)):
-        if other is None or not _closes_part(pool, other) or names | other.names in pool.full_fits:
+        if other is None or not closes_part(pool, other) or names | other.names in pool.full_fits:
             continue
         forms = [g for g in pool.screen(other, other.names) if g.effect_model.name == model.name]
-        for gain in forms[:1]:
-            fit_extension(pool, other, gain)
-        for gain in forms[1:]:
-            if gain.effect_model == model:
+        for gain in forms:
+            if gain is forms[0]:
+                fit_extension(pool, other, gain)
+            elif gain.effect_model == model:
                 fit_extension(pool, other, gain, [values])
-
-
-def _closes_part(pool: CandidatePool, single: Candidate) -> bool:
-    """Return True if an effect alone closes a part of the gap that is worth a fit with others."""
-    return pool.compute_excess(single) < pool.settings.helpful_mounting_share * pool.baseline_excess
 
 
 def is_dominant(pool: CandidatePool, gain: ScreeningResult) -> bool:

@@ -17,8 +17,12 @@ from identification.gap.selection.screening import ScreeningResult, compute_expe
 def is_mounting_promising(pool: CandidatePool, parent: Candidate, name: str) -> bool:
     """Return False for a set with other effects if the mounting effect alone closed next to none of the gap."""
     alone = pool.candidates.get(frozenset({name}))
-    share = pool.settings.helpful_mounting_share
-    return not parent.names or alone is None or pool.compute_excess(alone) < share * pool.baseline_excess
+    return not parent.names or alone is None or closes_part(pool, alone)
+
+
+def closes_part(pool: CandidatePool, single: Candidate) -> bool:
+    """Return True if an effect alone closes a part of the gap that is worth a fit with others."""
+    return pool.compute_excess(single) < pool.settings.helpful_mounting_share * pool.baseline_excess
 
 
 def fit_mounting(pool: CandidatePool, parent: Candidate, gains: Sequence[ScreeningResult], name: str) -> None:
@@ -33,8 +37,8 @@ def fit_mounting(pool: CandidatePool, parent: Candidate, gains: Sequence[Screeni
 def _fit_forms(pool: CandidatePool, parent: Candidate, gains: Sequence[ScreeningResult]) -> None:
     """Fit a set with the forms of a mounting effect, the simplest first.
 
-    With other effects, the first form that closes next to nothing is the last one. Alone, all forms are fitted: a
-    joint that stiffens under load may not resemble a linear spring at all.
+    With other effects, after a form that closes next to nothing, only those follow that a linear step expects to
+    close enough. Alone, all forms are fitted: a joint that stiffens under load may not resemble a linear spring.
     """
     settings = pool.settings
     simpler: dict[str, float] = {}

@@ -72,7 +72,7 @@ class SearchSettings:
     richer_form_share: float = 0.8
     """Part of a set's excess that a form of a mounting effect may leave for richer ones to be fitted with it."""
     helpful_mounting_share: float = 0.97
-    """Part of the excess that a mounting effect alone may leave to be fitted with other effects as well."""
+    """Part of the excess that a mounting or confusable effect alone may leave to be fitted with others as well."""
 
     # Exchange
     pruned_sets: int = 2

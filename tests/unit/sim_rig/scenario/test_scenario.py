@@ -6,6 +6,7 @@ from identification.damper.effects import EFFECTS
 from identification.damper.parameter_sets import PARAMETER_SETS
 from sim_rig.errors import ScenarioError
 from sim_rig.scenario.scenario import list_shipped_scenarios, load_scenario, parse_scenario
+from tests.support.effects import MEDIUM
 
 LABORATORY = PARAMETER_SETS["laboratory"].parameters._asdict()
 BACKLASH = {"name": "clevis_backlash", "parameters": {"gap": 1e-4}}
@@ -48,6 +49,12 @@ def test_a_named_sensor_replaces_the_default_one_completely(varied):
     assert (force.noise, force.filter, force.resolution) == (1.0, None, 0.0)
 
 
+def make_medium(name, form):
+    """An effect of a scenario in one of its forms, at its medium size."""
+    symbols = [q.symbol for q in EFFECTS[name].find_form(form).parameters]
+    return {"name": name, "form": form, "parameters": dict(zip(symbols, MEDIUM[name][form], strict=True))}
+
+
 REFUSED = {
     "unknown set": ({"damper": "racing"}, "no parameter set 'racing'; there are laboratory"),
     "parameter out of bounds": ({"damper": {**LABORATORY, "n": 9.0}}, r"n \(.*\) is 9, outside 1 to 6$"),
@@ -65,6 +72,10 @@ REFUSED = {
         r"clevis_backlash.gap \(.*\) is 0.2 m, outside 0 to 0.133333 m$",
     ),
     "effect twice": ({"effects": [BACKLASH, BACKLASH]}, "listed twice"),
+    "two deflections": (
+        {"effects": [make_medium("seal_friction", "presliding"), make_medium("side_load_friction", "bristle")]},
+        "seal_friction, side_load_friction have a friction with deflection each, at most one may",
+    ),
     "units at odds": ({"drive_unit": "A"}, "drive_unit is A, but coil_v is in V"),
     "damper of another unit": ({"damper": "lord_class"}, "lord_class is driven in A, but drive_unit is V"),
     "unknown field": ({"colour": "red"}, "colour: there is no such key"),
